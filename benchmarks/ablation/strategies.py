@@ -131,7 +131,7 @@ _AGE_ON_BOARD: Final = {
     "half-life-3h-share-paper-300": 8.0,
 }  # fmt: skip
 _FEW_OF_AGE: Final = {"half-life-3h-100": 8.0}
-_OF_AGE: Final = {"half-life-3h-100": 8.0, "half-life-12h-1000": 12.0}
+_OF_AGE: Final = {**_FEW_OF_AGE, "half-life-12h-1000": 12.0}
 _FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
 _SHARED: Final = {"share-fleet-paper-4x500": 12.0}

@@ -143,6 +143,11 @@ def is_aging_alone(problem: Problem) -> bool:
     return is_aging(problem) and not is_shared(problem)
 
 
+def is_aging_but_no_fleet(problem: Problem) -> bool:
+    """Whether images of one satellite do, or of several with little to choose from."""
+    return is_aging(problem) and not is_fleet(problem)
+
+
 def is_aging_on_board(problem: Problem) -> bool:
     """Whether many images of one satellite do, and earn the larger part when they are taken."""
     is_many = len(problem.opportunities) > TUNING.open_tasks
