@@ -1,7 +1,8 @@
 """Run the suite, or compare two of its files.
 
-``python -m benchmarks.suite [--quick] [--into FILE] [--families ...]`` runs each case that is not
-yet in the file, in a process of its own and on one core; the quick form takes some five minutes.
+``python -m benchmarks.suite [--quick] [--draws N] [--into FILE] [--families ...]`` runs each case
+that is not yet in the file, in a process of its own and on one core; the quick form takes some five
+minutes.
 ``python -m benchmarks.suite compare BEFORE AFTER`` prints what has become better and worse.
 """
 
@@ -27,6 +28,7 @@ def main() -> None:
     """Do what the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.suite", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one draw of each, smaller budgets")
+    parser.add_argument("--draws", type=int, metavar="N", help="so many of each family")
     parser.add_argument("--into", type=Path, default=Path("build/suite.csv"), metavar="FILE")
     parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
     commands = parser.add_subparsers(dest="command")
@@ -41,7 +43,7 @@ def main() -> None:
     elif options.command == "one":
         print(json.dumps(asdict(run_case(Case(**json.loads(options.case))))))
     else:
-        run(cases(options.families, is_quick=options.quick), options.into)
+        run(cases(options.families, options.draws, is_quick=options.quick), options.into)
 
 
 def _read(path: Path) -> list[rows.Row]:
@@ -51,14 +53,14 @@ def _read(path: Path) -> list[rows.Row]:
     return found
 
 
-def cases(families: list[str], *, is_quick: bool) -> list[Case]:
-    """Return the cases of the full form, or of the quick one."""
+def cases(families: list[str], num_draws: int | None = None, *, is_quick: bool) -> list[Case]:
+    """Return the cases of the full form, or of the quick one; with so many draws of each family."""
     found = []
     for name in families:
         family = FAMILIES[name]
         budget_s = family.quick_budget_s if is_quick else family.budget_s
         if budget_s is not None:
-            for draw in range(1 if is_quick else family.num_draws):
+            for draw in range(num_draws or (1 if is_quick else family.num_draws)):
                 found.append(Case(family=name, draw=draw, seed=draw, budget_s=budget_s))
     # The first draws of all come first: a file that was stopped early still has every family.
     return sorted(found, key=lambda case: case.draw)

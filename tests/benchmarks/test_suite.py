@@ -145,3 +145,9 @@ def test_the_quick_form_takes_five_minutes() -> None:
     assert sum(case.budget_s for case in quick) <= 240.0  # the rest starts processes
     assert {case.family for case in full} == set(names)
     assert len(set(full)) == len(full) > len(quick)
+
+
+def test_as_many_draws_as_are_asked_for() -> None:
+    few = suite.cases(["paper-200", "agility-200"], 3, is_quick=False)
+    assert [case.draw for case in few] == [0, 0, 1, 1, 2, 2]
+    assert {case.seed - case.draw for case in few} == {0}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service as DriverService
 from selenium.webdriver.remote.webelement import WebElement
 
-from tests.patience import PATIENCE_S
+from tests.patience import PATIENCE_S, wait_until
 from tests.service.serving import serving
 
 LAPTOP: Final = (1366, 900)
@@ -70,11 +69,7 @@ class Browser:
 
     def wait(self, is_so: Callable[[], object], what: str = "") -> None:
         """Wait until something is so."""
-        deadline_s = time.monotonic() + PATIENCE_S
-        while not is_so():
-            told = f"{what}\n{self.text('main')[:2000]}"
-            assert time.monotonic() < deadline_s, told
-            time.sleep(0.05)
+        wait_until(is_so, lambda: f"{what}\n{self.text('main')[:2000]}")
 
     def wait_for_answer(self) -> str:
         """Wait for a job's page to show all its panels; return the job's address in the API."""
