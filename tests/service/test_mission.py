@@ -62,17 +62,14 @@ class Service:
 
     def until(self, job_id: str, *states: str) -> Document:
         """Return the job as soon as it is in one of these states."""
-        job: Document = {}
-
-        def is_so() -> bool:
-            job.update(self.get(f"/v1/jobs/{job_id}"))
+        deadline_s = time.monotonic() + PATIENCE_S
+        while True:
+            job: Document = self.get(f"/v1/jobs/{job_id}")
             if job["state"] in states:
-                return True
+                return job
             assert job["state"] not in FINAL, job
-            return False
-
-        wait_until(is_so, job)
-        return job
+            assert time.monotonic() < deadline_s, job
+            time.sleep(0.05)
 
     def all_targets(self, job_id: str) -> list[Document]:
         items: list[Document] = []
