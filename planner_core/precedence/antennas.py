@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import numpy.typing as npt
 
 from planner_core.problem import CONTACT, Floats, Longs, Problem
 from planner_core.problem.slew import TIME_TOLERANCE_S
@@ -45,20 +46,29 @@ def _groups(problem: Problem) -> Iterator[AntennaGroup]:
     table = problem.opportunities
     for station, antennas in enumerate(problem.station_antennas.tolist()):
         rows = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
-        rows = rows[np.argsort(table.start_s[rows], kind="stable")]
-        group: set[int] = set()
-        groups = []
-        for at, row in enumerate(rows.tolist()):
-            still = rows[:at][table.end_s[rows[:at]] > table.start_s[row] + TIME_TOLERANCE_S]
-            running = {row, *still.tolist()}
-            if not group <= running:
-                # One of those before has ended: they are all there is of their group.
-                groups.append(group)
-            group = running
-        for contacts in map(sorted, [*groups, group]):
+        for contacts in at_the_same_time(problem, rows):
             # A satellite has one contact at a time, whatever its station can serve.
             if len(np.unique(table.satellite[contacts])) > antennas:
                 yield AntennaGroup(np.array(contacts, dtype=np.int64), antennas)
+
+
+def at_the_same_time(problem: Problem, rows: npt.NDArray[np.integer]) -> list[list[int]]:
+    """Return the largest sets of these opportunities that go on at one instant, in order of time.
+
+    Rows are ascending in each.
+    """
+    table = problem.opportunities
+    rows = rows[np.argsort(table.start_s[rows], kind="stable")]
+    running: set[int] = set()
+    found = []
+    for at, row in enumerate(rows.tolist()):
+        still = rows[:at][table.end_s[rows[:at]] > table.start_s[row] + TIME_TOLERANCE_S]
+        now = {row, *still.tolist()}
+        if not running <= now:
+            # One of those before has ended: they are all there is of their set.
+            found.append(running)
+        running = now
+    return [sorted(one) for one in [*found, running] if one]
 
 
 def antenna_tolls(problem: Problem, prices: Floats | None) -> Floats:

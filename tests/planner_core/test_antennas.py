@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.mip.antenna_prices import antenna_prices
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.resources import PriceSearch
 from planner_core.certified.proofs.bound import rounded_bound
@@ -35,6 +36,7 @@ from tests.planner_core.brute_force import best_reward
 from tests.planner_core.problems import TIGHT, Task, make_problem, random_problem, varied_problem
 
 SEEDS = st.integers(0, 10**6)
+_DELIVERED = Objective.delivered()
 ROOMY = replace(Resources.limitless(), collect_fill_per_s=0.001, downlink_per_s=0.001)
 
 
@@ -45,16 +47,21 @@ def crowded(seed: int, dynamics: Dynamics, objective: Objective, antennas: int =
     return with_objective(problem, objective)
 
 
-def shared_pass() -> Problem:
-    """Return two satellites with two images each and one pass at the same time."""
-    tasks = [Task(kind=CONTACT, place=0, satellite=s, start_s=800.0, end_s=900.0) for s in (0, 1)]
+def shared_pass(num_satellites: int = 2, objective: Objective = _DELIVERED) -> Problem:
+    """Return satellites with two images each and one pass at the same time."""
+    tasks = [
+        Task(kind=CONTACT, place=0, satellite=s, start_s=800.0, end_s=900.0)
+        for s in range(num_satellites)
+    ]
     tasks += [
         Task(kind=COLLECT, place=2 * s + i, satellite=s, start_s=at_s, end_s=at_s + 30.0)
-        for s in (0, 1)
+        for s in range(num_satellites)
         for i, at_s in enumerate((100.0 + s, 400.0 + s))
     ]
-    problem = make_problem(tasks, num_targets=4, num_satellites=2, resources=ROOMY)
-    return with_objective(problem, Objective.delivered())
+    problem = make_problem(
+        tasks, num_targets=2 * num_satellites, num_satellites=num_satellites, resources=ROOMY
+    )
+    return with_objective(problem, objective)
 
 
 @examples(100)
@@ -123,6 +130,57 @@ def test_prices_tell_that_one_of_two_satellites_is_served() -> None:
     assert bound.antenna_prices is not None
     assert is_proven(problem, from_json(to_json(bound)))
     assert not is_proven(problem, replace(bound, antenna_prices=None))
+
+
+@pytest.mark.parametrize("collected_share", [0.0, 0.5])
+def test_contacts_pay_for_all_that_they_bring_down(collected_share: float) -> None:
+    problem = shared_pass(2, Objective(collected_share=collected_share))
+    everything = np.ones(len(problem.opportunities), dtype=np.bool_)
+    paid = antenna_prices(problem, relaxations(problem), [everything], Budget(), 0)
+    assert paid is not None
+    assert paid.of_groups == pytest.approx([2.0 * (1.0 - collected_share)])
+    assert paid.share == pytest.approx(np.full(4, collected_share))
+    search = PriceSearch(problem, 4.0, np.zeros(4), np.zeros(1, dtype=np.uint8))
+    search.restart(paid.share, paid.of_groups)
+    search.step(0.0)
+    assert search.value == pytest.approx(best_reward(problem), rel=0.02)  # in whole units
+
+
+def test_a_contact_pays_for_no_more_than_was_recorded_before_it() -> None:
+    problem = shared_pass()
+    table = problem.opportunities
+    first = (table.kind == CONTACT) | (table.place % 2 == 0)
+    paid = antenna_prices(problem, relaxations(problem), [first], Budget(), 0)
+    assert paid is not None
+    assert paid.of_groups == pytest.approx([1.0])
+
+
+def test_what_all_comes_down_pays_for_nothing() -> None:
+    problem = shared_pass()
+    alone = problem.opportunities.satellite == 0
+    assert antenna_prices(problem, relaxations(problem), [alone], Budget(), 0) is None
+    roomy = replace(problem, station_antennas=np.array([2], dtype=np.int32))
+    everything = np.ones(len(problem.opportunities), dtype=np.bool_)
+    assert antenna_prices(roomy, relaxations(roomy), [everything], Budget(), 0) is None
+
+
+@pytest.mark.parametrize("collected_share", [0.0, 0.5])
+def test_a_fleet_over_one_station_is_bounded_by_what_it_brings_down(
+    collected_share: float,
+) -> None:
+    problem = shared_pass(6, Objective(collected_share=collected_share))
+    search = ResourceSearch(Incumbent(problem, Budget(), 0.0), 0)
+    contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)
+    search.offer(Plan.of(problem, np.setdiff1d(np.arange(18), contacts[1:])))
+    with tuned(several=1):
+        pricing = FleetPricing(search)
+        while not pricing.is_settled:
+            pricing.turn()
+    bound = search.best.bound
+    most = 12.0 * collected_share + 2.0 * (1.0 - collected_share)
+    assert bound.value == pytest.approx(most, rel=0.02)  # in whole units
+    assert is_proven(problem, bound)
+    assert bound.antenna_prices is not None
 
 
 def _crowded_fleet(seed: int) -> Problem:

@@ -100,7 +100,7 @@ class _Engine(Engine):
         return _Point(
             value=value,
             columns=np.array(solution.col_value),
-            row_prices=np.abs(np.array(solution.row_dual)),
+            row_prices=self.row_prices,
             losses=np.abs(np.array(solution.col_dual)),
         )
 

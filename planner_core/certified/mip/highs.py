@@ -124,6 +124,12 @@ class Engine:
         return self._bound
 
     @property
+    def row_prices(self) -> Floats:
+        """What the last relaxation would gain by one more of each row's limit."""
+        prices: Floats = np.abs(np.array(self._highs.getSolution().row_dual))
+        return prices
+
+    @property
     def log(self) -> str:
         """What HiGHS had to say: the end of it, which holds the result."""
         return "".join(self._messages)[-LOG_CHARACTERS:]

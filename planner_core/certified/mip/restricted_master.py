@@ -73,7 +73,7 @@ class Master(Engine):
     def multipliers(self) -> Multipliers:
         """Return the prices that the last relaxation has put on targets and cuts."""
         rows = self._rows
-        price = np.abs(np.array(self._highs.getSolution().row_dual)) * self._scale
+        price = self.row_prices * self._scale
         prices = price[: self._num_targets].copy()
         place = self._problem.opportunities.place
         cuts, cut_prices = [], []

@@ -17,6 +17,7 @@ from planner_core.precedence.antennas import antenna_groups, paid_for_antennas
 from planner_core.problem import (
     COLLECT,
     CONTACT,
+    Bools,
     Bytes,
     Floats,
     Ints,
@@ -171,6 +172,14 @@ class PriceSearch:
     def is_settled(self) -> bool:
         """Whether steps have got so short that more are of little use."""
         return bool(self.theta <= TUNING.shorter**TUNING.tries)
+
+    @property
+    def latest(self) -> Bools:
+        """Which opportunities the latest answers take. Shape ``(n,)``."""
+        taken = np.zeros(len(self._problem.opportunities), dtype=np.bool_)
+        for relaxation, paths in zip(self.satellites, self._paths, strict=True):
+            taken[relaxation.satellite.rows[paths[-1]]] = True
+        return taken
 
     def learn(self, plan: Plan) -> None:
         """Note a plan that is known."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import partial
+from operator import itemgetter
 
 import numpy as np
 
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
+from planner_core.certified.mip.antenna_prices import antenna_prices
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.ascent import Ascent, Steps
@@ -162,11 +164,10 @@ class FleetPricing:
             yield from self._go_by_plan(energy, prices)
         search.price(prices, 1)
         self.prices = prices
-        if prices.wants_antennas and search.problem.counts_delivery:
-            yield from self._price_antennas(prices, known)
-            if self.knows_antennas:
-                yield from self._prove_finely(prices)
-                return
+        wants_antennas = prices.wants_antennas and search.problem.counts_delivery
+        if wants_antennas and (yield from self._price_antennas(prices, known)):
+            yield from self._prove_finely(prices)
+            return
         if not is_far and prices.value < (1.0 - TUNING.worth_a_step) * energy.value:
             yield from self._go_by_plan(energy, prices)
         yield beside_prices
@@ -200,8 +201,8 @@ class FleetPricing:
         prices.count_finely(self._search.best.plan)
         self._search.price(prices, 1)
 
-    def _price_antennas(self, prices: PriceSearch, known: Bound) -> Iterator[int]:
-        """Let prices of antennas lower the bound, as long as they do.
+    def _price_antennas(self, prices: PriceSearch, known: Bound) -> Generator[int, None, bool]:
+        """Let prices of antennas lower the bound, as long as they do; return whether they have.
 
         Parameters
         ----------
@@ -210,9 +211,15 @@ class FleetPricing:
         """
         if known.unit is not None and known.prices is not None and known.value < prices.value:
             prices.restart(known.prices)
-        # Steps are many, and rounding to larger units loses less than they gain.
-        unit, at_first = prices.unit, min(known.value, prices.value)
+        at_first = min(known.value, prices.value)
+        paid = yield from self._pay_for_volume(prices, at_first)
+        is_paid, at_first = paid < at_first, paid
+        if not self._search.problem.objective.is_delivered:
+            # Where images earn a share on board further steps gain nothing that pays for them.
+            return is_paid
         began = prices.prices, prices.antenna_prices
+        # Steps are many, and rounding to larger units loses less than they gain.
+        unit = prices.unit
         prices.count_in(TUNING.several * unit, moves_antennas=True)
         prices.usage[:] = 0.0
         for _ in range(TUNING.tries):
@@ -223,11 +230,39 @@ class FleetPricing:
             prices.count_in(unit, moves_antennas=False)
             if not is_lower:
                 prices.restart(*began)
-            return
+            return is_paid
         self.knows_antennas = True
         while not prices.is_settled:
             yield 1
             self._search.price(prices, TUNING.several)
+        return True
+
+    def _pay_for_volume(self, prices: PriceSearch, at_first: float) -> Generator[int, None, float]:
+        """Ask prices at which contacts pay for all that images earn by coming down.
+
+        Those of targets are lower by as much: by what the program says of their images, or all to
+        what images earn on board. Return what the better of the two proves if that lowers the
+        bound by much, and what is known if not.
+        """
+        search = self._search
+        began = prices.prices, prices.antenna_prices
+        plan = search.mask(action.opportunity for action in search.best.plan.actions)
+        choices = plan, prices.latest
+        paid = antenna_prices(
+            search.problem, prices.satellites, choices, search.budget, search.seed
+        )
+        if paid is None:
+            return at_first
+        best = at_first * (1.0 - TUNING.worth_a_step), *began
+        for share in (paid.share, search.problem.objective.collected_share):
+            yield TUNING.steps_beside
+            prices.restart(share * began[0], paid.of_groups)
+            search.price(prices, 1)
+            best = min(
+                best, (prices.value, prices.prices, prices.antenna_prices), key=itemgetter(0)
+            )
+        prices.restart(*best[1:])
+        return at_first if best[1] is began[0] else best[0]
 
     def _ask_near(self, prices: Floats) -> None:
         """Let satellites answer prices near these, by energy alone: more tasks get to be known."""

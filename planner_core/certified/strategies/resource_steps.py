@@ -143,10 +143,13 @@ class ResourceSearch:
     def price(self, prices: PriceSearch, num_steps: int) -> None:
         """Make steps towards better prices."""
         for _ in range(num_steps):
-            if self.best.is_done or not prices.step(max(self.best.reward, self.relaxed)):
+            if self.best.is_done:
                 return
+            goes_on = prices.step(max(self.best.reward, self.relaxed))
             self._priced = min(self._priced, prices.value)
             self.best.lower(prices.bound())
+            if not goes_on:
+                break
         self.best.report("prices")
 
     def prices(self) -> Floats:
