@@ -103,9 +103,10 @@ class FleetPricing:
     """Prices by energy alone, then by relaxations with the plan's contacts; and what they prove.
 
     To search with the exact programmes takes fifty times as long as with energy alone, and brings
-    next to nothing where each satellite has an antenna when it wants one. Where some do not, prices
-    of antennas are found by it alone: four satellites and two stations that are to bring down all
-    images come to 865 in place of 887, and another four to 1,068 in place of 1,077.
+    next to nothing where each satellite has an antenna when it wants one. Where some do not it is
+    asked at prices of antennas: a linear program has them (``antenna_prices``), and where images
+    count on the ground alone steps go on from there. Four satellites and two stations come to 865
+    in place of 887 by such steps, and another four to 1,068 in place of 1,077.
     Otherwise the relaxation of the plan's contacts knows of recorders as well, and its
     prices are nearly the best for all contacts.
 
