@@ -155,6 +155,25 @@ def test_a_contact_pays_for_no_more_than_was_recorded_before_it() -> None:
     assert paid.of_groups == pytest.approx([1.0])
 
 
+def test_images_of_a_satellite_with_an_antenna_of_its_own_pay_nothing() -> None:
+    """The third passes later. What it takes after that stays on board."""
+    tasks = [
+        Task(kind=CONTACT, place=0, satellite=s, start_s=at_s, end_s=at_s + 100.0)
+        for s, at_s in enumerate((800.0, 800.0, 1200.0))
+    ]
+    tasks += [
+        Task(kind=COLLECT, place=place, satellite=s, start_s=at_s, end_s=at_s + 30.0)
+        for place, (s, at_s) in enumerate([(0, 100.0), (1, 101.0), (2, 102.0), (2, 1500.0)])
+    ]
+    problem = make_problem(tasks, num_targets=4, num_satellites=3, resources=ROOMY)
+    problem = with_objective(problem, Objective(collected_share=0.5))
+    everything = np.ones(len(problem.opportunities), dtype=np.bool_)
+    paid = antenna_prices(problem, relaxations(problem), [everything], Budget(), 0)
+    assert paid is not None
+    assert paid.share[:3] == pytest.approx([0.5, 0.5, 1.0])
+    assert problem.best_worth[3] == 0.5  # no contact follows
+
+
 def test_what_all_comes_down_pays_for_nothing() -> None:
     problem = shared_pass()
     alone = problem.opportunities.satellite == 0

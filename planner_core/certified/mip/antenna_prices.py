@@ -101,9 +101,10 @@ def antenna_prices(
         None where all of it can come down, or time is over.
     """
     downlinks = [_Downlink(problem, one, choices) for one in satellites]
-    is_taken = np.logical_or.reduce(choices)
-    recorded = sum(float(one.size[is_taken[one.own]].sum()) for one in downlinks)
-    lost = float(lost_on_board(problem)[is_taken].sum())
+    # Images after which no contact follows earn what they do on board.
+    loses = np.logical_or.reduce(choices) & (lost_on_board(problem) > 0.0)
+    recorded = sum(float(one.size[loses[one.own]].sum()) for one in downlinks)
+    lost = float(lost_on_board(problem)[loses].sum())
     groups = antenna_groups(problem)
     if not (groups and recorded > 0.0 and lost > 0.0):
         return None
