@@ -133,6 +133,7 @@ _AGE_ON_BOARD: Final = {
 _FEW_OF_AGE: Final = {"half-life-3h-100": 8.0}
 _OF_AGE: Final = {**_FEW_OF_AGE, "half-life-12h-1000": 12.0}
 _FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
+_OF_AGE_SHARED: Final = {"half-life-6h-network-4x400": 20.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
 _SHARED: Final = {"share-fleet-paper-4x500": 12.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
@@ -170,7 +171,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
             "windows by small programs": _FEW_OF_AGE,
             "windows of the first plan": {"half-life-12h-1000": 12.0},
-            "days planned anew": {"half-life-6h-network-4x400": 20.0},
+            "a fleet's plans without the half-life": _OF_AGE_SHARED,
+            "days planned anew": _OF_AGE_SHARED,
             "multipliers of contacts": _OF_AGE,
             "queues": _OF_AGE,
             "plans by their contacts": _OF_AGE,

@@ -148,7 +148,8 @@ class Search:
 
     def solved(self) -> Solution:
         """Search until plan and bound are close enough, or no strategy gets any further."""
-        close_in(self)
+        for _ in close_in(self):
+            pass
         return self.best.solution(self.proof() if self.proof else None)
 
 
@@ -176,10 +177,11 @@ class Turn:
         self.num_idle = 0 if self.gain > trifle else self.num_idle + 1
 
 
-def close_in(search: Search) -> None:
+def close_in(search: Search) -> Iterator[None]:
     """Let the strategies close in on the best plan and its bound, each slice by the latest gains.
 
-    None waits for more than a few slices of others.
+    None waits for more than a few slices of others. It stops after each: a search beside another is
+    a strategy of that one, and each of its slices is one there.
     """
     like = search.problem if search.like is None else search.like
     left = [one for one in search.strategies if one.supports(like)]
@@ -202,6 +204,8 @@ def close_in(search: Search) -> None:
             for turn in turns:
                 turn.num_idle = 0
         turns = [turn for turn in turns if not turn.has_ended]
+        if not chosen.has_ended:
+            yield
 
 
 def _chosen(turns: Sequence[Turn]) -> Turn:

@@ -85,10 +85,9 @@ class Tuning:
     tidy_s
         What a label's second is worth less than a target for; and what separates two pieces.
     first_share, beginning
-        Of the time of a job for fixed starts before free ones, or for plans of a small fleet
-        without its half-life; and of time or moves for what other searches only begin with (for
-        plans of one satellite without its half-life, too), and for multipliers with a half-life at
-        a time.
+        Of the time of a job for fixed starts before free ones; and of time or moves for what other
+        searches only begin with (for plans of one satellite without its half-life, too), and for
+        multipliers with a half-life at a time.
 
     window_tasks
         Tasks between which a window lies, at least and at most.

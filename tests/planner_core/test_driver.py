@@ -8,7 +8,7 @@ from typing import Final
 import pytest
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.driver import Begin, Effort, Search, Slices, Strategy
+from planner_core.certified.driver import Begin, Effort, Search, Slices, Strategy, close_in
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.strategies.every import STRATEGIES
@@ -130,6 +130,23 @@ def test_a_strategy_is_asked_for_the_problems_that_it_supports_alone() -> None:
     assert log.names == ["b"]
     without = search.beside(search.best, 1, without=search.strategies[1].slices)
     assert [one.name for one in without.strategies] == ["a"]
+
+
+def test_the_slices_of_a_search_beside_are_slices_of_a_strategy() -> None:
+    log = Log()
+    inner = [
+        strategy("x", log.gaining("x", [1.0, 1.0])),
+        strategy("y", log.gaining("y", [2.0, 2.0])),
+    ]
+
+    def beside(search: Search) -> Iterator[None]:
+        for _ in close_in(Search(search.best, 1, inner)):
+            log.names.append("|")
+            yield
+
+    search_by([strategy("a", log.gaining("a", [1.5] * 3)), strategy("b", beside)]).solved()
+    # Of the inner search: x and y begin, y gains more. Outside that is a gain of b.
+    assert "".join(log.names) == "ax|aay|y|x|"
 
 
 def test_engines_are_shared() -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 from typing import Literal
 
 import numpy as np
@@ -18,7 +17,7 @@ from planner_core.certified.dp import contact_layers
 from planner_core.certified.dp.contact_layers import Layers, layers_of, most_by_contacts
 from planner_core.certified.dp.energy_labels import EnergyLevels, energy_levels
 from planner_core.certified.dp.resource_network import Network, network_of
-from planner_core.certified.driver import Search, Slices
+from planner_core.certified.driver import Search, Strategy
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.settled_contacts import worth_with
 from planner_core.certified.multipliers.latency import LatencyAscent
@@ -29,11 +28,8 @@ from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.signs import NEVER
 from planner_core.certified.solver import Certified
 from planner_core.certified.strategies import days
-from planner_core.certified.strategies.days import DayByDay
+from planner_core.certified.strategies.days import FullWorth, plans_without_half_life
 from planner_core.certified.strategies.every import STRATEGIES
-from planner_core.certified.strategies.half_life_steps import Contacts
-from planner_core.certified.strategies.resource_steps import ResourceSearch
-from planner_core.certified.strategies.whole_program import exhaust
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective
 from planner_core.problem import COLLECT, CONTACT, Floats, Problem
@@ -43,7 +39,7 @@ from planner_core.referee.replay import replay
 from planner_core.solvers.rule import Rule
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
-from tests.planner_core.budgets import Reports, bounds_told, expiring
+from tests.planner_core.budgets import bounds_told, expiring
 from tests.planner_core.problems import (
     TIGHT,
     make_problem,
@@ -278,81 +274,96 @@ def test_a_fleet_earns_more_than_by_a_plan_that_knows_of_no_half_life(seed: int)
     assert solution.bound >= reward
 
 
-def _search_beside_by(
-    work: Callable[[Incumbent, int], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Let something else be done where a search begins another."""
-
-    beside = Search.beside
-
-    def worked(
-        self: Search,
-        best: Incumbent,
-        seed: int,
-        *,
-        like: Problem | None = None,
-        without: Slices | None = None,
-    ) -> Search | SimpleNamespace:
-        if without is exhaust:
-            return SimpleNamespace(solved=partial(work, best, seed))
-        return beside(self, best, seed, like=like, without=without)
-
-    monkeypatch.setattr(Search, "beside", worked)
-
-
-def test_a_fleet_s_search_for_plans_is_interrupted_for_better_days(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """After a quarter of the time, then after half of what is left, and each time it ends.
-
-    The whole program before it has told of itself twice, multipliers in between once.
-    """
-
-    def told_40_times(best: Incumbent, seed: int) -> None:
-        for _ in range(40):
-            best.report("plans")
-        # Another plan for each seed.
-        best.plan = Plan(Rule().solve(best.problem, Budget(), 0).plan.actions[:seed])
-
-    budget, left = Reports(100), list[int]()
-    _search_beside_by(told_40_times, monkeypatch)
-    monkeypatch.setattr(DayByDay, "better", lambda *_: left.append(budget.left))
+def _fleet_in_a_hurry() -> Problem:
     problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
-    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
-    solution = Certified().solve(hurried, budget, 0)
-    assert replay(hurried, solution.plan).is_valid
-    assert left[:4] == [73, 58, 36, 17]
+    return with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
 
 
-def test_a_fleet_s_search_that_ends_with_the_same_plan_again_is_not_begun_afresh(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    ended = list[int]()
-    _search_beside_by(lambda _, seed: ended.append(seed), monkeypatch)
-    problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
-    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
-    Certified().solve(hurried, Reports(100), 0)
-    assert ended == [0, 1]
+def _offering(*plans: Plan) -> Strategy:
+    """Return a strategy that offers plans where the half-life does not count, one in a slice."""
+
+    def slices(search: Search) -> Iterator[None]:
+        for plan in plans:
+            search.best.offer(plan)
+            yield
+
+    return Strategy(
+        name="offers", supports=lambda p: p.objective.half_life_s is None, slices=slices
+    )
 
 
-def test_a_fleet_s_days_begin_with_the_best_plan(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It may be the plan that was offered, with more contacts."""
-    problem = random_problem(2, num_collects=40, num_contacts=4, num_satellites=2)
-    hurried = with_objective(problem, Objective(collected_share=0.0, half_life_s=4000.0))
-    good = Certified().solve(hurried, expiring(bounds_told(2)), 0).plan
-    worse = Plan(good.actions[:-2])
-    assert replay(hurried, worse).reward < replay(hurried, good).reward
+def _plans_of_growing_worth() -> tuple[Problem, list[Plan]]:
+    hurried = _fleet_in_a_hurry()
+    plan = Certified().solve(hurried, expiring(bounds_told(2)), 0).plan
+    return hurried, [Plan(plan.actions[:num]) for num in range(1, len(plan.actions) + 1)]
+
+
+def test_a_fleet_s_search_without_the_half_life_gives_way_after_each_slice() -> None:
+    """From its second plan on: the first is the rule's. Once it ends as before, no more follow."""
+    hurried, plans = _plans_of_growing_worth()
+    search = Search(Incumbent(hurried, Budget(), 0.0), 0, [_offering(*plans)])
+    full, known = search.engine(FullWorth), list[Plan]()
+    for _ in plans_without_half_life(search):
+        assert full.plan is not None
+        assert search.best.reward >= replay(hurried, full.plan).reward
+        known.append(full.plan)
+    half = len(known) // 2
+    assert known[:half] == known[half:]
+    assert 1 < len(set(known)) < len(plans)
+    lasting = with_objective(hurried, Objective.delivered())
+    assert replay(lasting, known[-1]).reward == replay(lasting, plans[-1]).reward
+    assert not full.is_going
+
+
+def test_a_fleet_s_search_that_gains_nothing_ends_after_some_times() -> None:
+    """Each time with another plan: what is best is known from the beginning."""
+    hurried, plans = _plans_of_growing_worth()
+    begun = list[int]()
+
+    def slices(search: Search) -> Iterator[None]:
+        begun.append(search.seed)
+        search.best.offer(plans[-1 - search.seed])
+        yield
+
+    other = replace(_offering(), slices=slices)
+    best = Incumbent(hurried, Budget(), 0.0, plan=plans[-1])
+    with tuned(patience=3):
+        list(plans_without_half_life(Search(best, 0, [other])))
+    assert begun == [0, 1, 2]
+
+
+def _days_begun(
+    hurried: Problem, good: Plan, offered: Plan, monkeypatch: pytest.MonkeyPatch
+) -> list[Plan]:
+    """Return the plans from which days are planned anew, without success."""
     begun = list[Plan]()
 
     def noted(_: Problem, plan: Plan, *args: object) -> None:
         begun.append(plan)
 
     monkeypatch.setattr(days, "replanned_day", noted)
-    best = Incumbent(hurried, Budget(), 0.0, plan=good)
-    search = Search(best, 0, STRATEGIES)
-    DayByDay(search.engine(ResourceSearch), search.engine(Contacts)).better(worse)
+    search = Search(Incumbent(hurried, Budget(), 0.0, plan=good), 0, STRATEGIES)
+    full = search.engine(FullWorth)
+    full.is_going = True
+    slices = days.days(search)
+    next(slices)
+    assert not begun
+    full.plan = offered
+    next(slices)
+    full.is_going = False
+    list(slices)
+    return begun
+
+
+def test_a_fleet_s_days_wait_for_a_plan_and_begin_with_the_best(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It may be the plan that was offered, with more contacts."""
+    hurried, plans = _plans_of_growing_worth()
+    begun = _days_begun(hurried, plans[-1], plans[-3], monkeypatch)
+    assert replay(hurried, plans[-3]).reward < replay(hurried, plans[-1]).reward
     assert begun
-    assert replay(hurried, begun[0]).reward >= replay(hurried, good).reward
+    assert replay(hurried, begun[0]).reward >= replay(hurried, plans[-1]).reward
 
 
 @pytest.mark.parametrize("fill_per_s", [0.0, ROOMY.collect_fill_per_s])

@@ -212,13 +212,18 @@ STRATEGIES: Final = (
         slices=half_life.plans_without_half_life,
     ),
     Strategy(
+        name="a fleet's plans without the half-life",
+        supports=lambda p: is_aging(p) and is_shared(p),
+        slices=days.plans_without_half_life,
+    ),
+    Strategy(
         name="days planned anew",
         supports=lambda p: is_aging(p) and is_shared(p),
         slices=days.days,
     ),
     Strategy(
         name="multipliers of contacts",
-        supports=is_aging_but_no_fleet,
+        supports=is_aging,
         slices=half_life.multipliers,
         patience=lambda: TUNING.tries,
     ),
