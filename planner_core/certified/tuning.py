@@ -84,10 +84,9 @@ class Tuning:
         Of a day, that is bounded as a whole with free starts.
     tidy_s
         What a label's second is worth less than a target for; and what separates two pieces.
-    first_share, beginning
-        Of the time of a job for fixed starts before free ones; and of time or moves for what other
-        searches only begin with (for plans of one satellite without its half-life, too), and for
-        multipliers with a half-life at a time.
+    beginning
+        Of time or moves, for what other searches only begin with (for plans of one satellite
+        without its half-life, too), and for multipliers with a half-life at a time.
 
     window_tasks
         Tasks between which a window lies, at least and at most.
@@ -174,7 +173,6 @@ class Tuning:
     widths_s: tuple[float, float] = (2.5, 25.0)
     longest_piece_s: float = 15_000.0
     tidy_s: float = 60.0
-    first_share: float = 0.6
     beginning: float = 0.25
 
     window_tasks: tuple[int, int] = (3, 14)

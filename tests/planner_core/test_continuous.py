@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.driver import Effort, Search
+from planner_core.certified.driver import Effort, Search, Strategy
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.lns.insertion_with_resources import (
@@ -24,6 +24,7 @@ from planner_core.certified.proofs.continuous import ContinuousDual, continuous_
 from planner_core.certified.strategies import continuous
 from planner_core.certified.strategies.continuous import with_own_starts
 from planner_core.certified.strategies.every import solved
+from planner_core.certified.tuning import TUNING
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
 from planner_core.precedence.time_windows import spans_of, view_of
@@ -217,6 +218,45 @@ def test_progress_with_resources_tells_no_bound_of_fixed_starts() -> None:
     assert solution.bound is not None
     assert min(told) >= solution.bound
     assert solution.bound >= replay(problem, solution.plan).reward
+
+
+def test_what_fits_is_put_into_each_better_plan_with_fixed_starts_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not into the first, which is the rule's; and windows go on from the best plan there is."""
+    problem = flat_problem(
+        2, num_targets=30, num_contacts=2, horizon_s=1500.0, use_resources=True, spacing_s=60.0
+    )
+    whole = Rule().solve(problem, Budget(), 0).plan
+    plans = [Plan(whole.actions[:num]) for num in (2, 2, 4, 4, 6)]
+
+    def offered(search: Search) -> Iterator[None]:
+        for plan in plans:
+            search.best.offer(plan)
+            yield
+
+    filled, begun = list[Plan](), list[Plan]()
+
+    def fill(_: Problem, plan: Plan, __: Budget) -> Plan:
+        filled.append(plan)
+        return plan
+
+    def replan(_: Problem, plan: Plan, *others: object) -> Plan:
+        begun.append(plan)
+        return plan
+
+    monkeypatch.setattr(continuous, "filled_with_resources", fill)
+    monkeypatch.setattr(continuous, "replanned_window", replan)
+    offer = Strategy(name="offers", supports=lambda _: True, slices=offered)
+    best = Incumbent(problem, Budget(), 0.0, bound=accessible(problem), covers_starts=True)
+    search = Search(best, 0, [offer])
+    assert len(list(continuous.fixed_starts(search))) == 3
+    assert filled == [plans[2], plans[4]]
+    windows = continuous.windows_with_resources(search)
+    next(windows)
+    best.offer(whole)
+    next(windows)
+    assert begun == [plans[4]] * TUNING.several + [whole] * TUNING.several
 
 
 def test_windows_planned_anew_keep_what_must_be_and_often_better_the_plan() -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.driver import Search
+from planner_core.certified.driver import Search, slices_beyond_the_first_plan
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.continuous_search import ContinuousSearch
 from planner_core.certified.lns.insertion_with_resources import (
@@ -19,6 +19,7 @@ from planner_core.certified.multipliers.chains import ascend_on_chains
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
+from planner_core.problem.plan import Plan
 from planner_core.solvers.base import Solution
 
 
@@ -70,20 +71,27 @@ def chain_multipliers(search: Search) -> Iterator[None]:
 
 
 def fixed_starts(search: Search) -> Iterator[None]:
-    """Plan among the starts that opportunities have, then put in what fits between them.
+    """Plan among the starts that opportunities have, and put in what fits between them.
 
     What bounds that search bounds no plan with free starts: it is not reported.
     """
     budget, best = search.budget, search.best
-    part = budget.part(
-        TUNING.first_share, lambda progress: budget.report(replace(progress, bound=None))
-    )
+    part = budget.part(1.0, lambda progress: budget.report(replace(progress, bound=None)))
     inner = Incumbent(replace(search.problem, pointing=None), part, best.gap)
-    search.beside(inner, search.seed).solved()
-    best.offer(inner.plan)
-    best.offer(filled_with_resources(search.problem, inner.plan, budget))
-    best.report("insertion")
-    yield
+    beside, filled = search.beside(inner, search.seed), Plan()
+    for _ in slices_beyond_the_first_plan(beside):
+        filled = _filled(best, inner.plan, filled)
+        yield
+    _filled(best, inner.plan, filled)
+
+
+def _filled(best: Incumbent, plan: Plan, filled: Plan) -> Plan:
+    """Offer a plan, and with what fits between its tasks, unless that was done; return it."""
+    if plan != filled:
+        best.offer(plan)
+        best.offer(filled_with_resources(best.problem, plan, best.budget))
+        best.report("insertion")
+    return plan
 
 
 def windows_with_resources(search: Search) -> Iterator[None]:
@@ -91,10 +99,15 @@ def windows_with_resources(search: Search) -> Iterator[None]:
     best, rng = search.best, np.random.default_rng(search.seed)
     plan, num_idle = best.plan, 0
     while num_idle < TUNING.fleet_patience and plan.actions:
-        new = replanned_window(search.problem, plan, search.budget, rng)
-        if best.judge(new).reward >= best.judge(plan).reward:
-            plan = new
-        num_idle = 0 if best.offer(plan) else num_idle + 1
+        before = best.reward
+        if best.judge(plan).reward < before:
+            plan, num_idle = best.plan, 0
+        for _ in range(TUNING.several):
+            new = replanned_window(search.problem, plan, search.budget, rng)
+            if best.judge(new).reward >= best.judge(plan).reward:
+                plan = new
+            best.offer(plan)
+        num_idle = 0 if best.reward > before else num_idle + TUNING.several
         best.report("window search")
         yield
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from planner_core.budget import Progress
-from planner_core.certified.driver import Search, close_in
+from planner_core.certified.driver import Search, slices_beyond_the_first_plan
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.queue_plans import replanned_day
 from planner_core.certified.lns.settled_contacts import with_contacts
@@ -53,15 +53,14 @@ def plans_without_half_life(search: Search) -> Iterator[None]:
     undecayed, ended, num_idle = without_half_life(search.problem), list[Plan](), 0
     full.is_going = True
     while num_idle < TUNING.patience and not best.is_done:
-        before, rule = best.reward, np.inf
+        before = best.reward
         inner = Incumbent(undecayed, search.budget.part(1.0, look), best.gap)
-        for _ in close_in(search.beside(inner, search.seed + len(ended), without=exhaust)):
+        beside = search.beside(inner, search.seed + len(ended), without=exhaust)
+        # With days from the rule's plan two large fleets end 1.4 % lower.
+        for _ in slices_beyond_the_first_plan(beside):
+            full.plan = inner.plan
             engine.offer(inner.plan)
-            rule = min(rule, inner.reward)
-            # Two large fleets begin at the rule's plan otherwise, and end 1.4 % lower.
-            if inner.reward > rule:
-                full.plan = inner.plan
-                yield
+            yield
         full.plan = inner.plan
         if inner.plan in ended:
             break  # so few tasks that every search ends with the same

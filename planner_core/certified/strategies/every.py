@@ -136,19 +136,6 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.tries,
     ),
     Strategy(
-        name="a fleet's programs with the plan's contacts",
-        supports=lambda p: fits_a_program(p) and is_shared(p),
-        slices=resources.own_contacts,
-        patience=lambda: TUNING.tries,
-    ),
-    Strategy(
-        name="a small fleet's multipliers",
-        supports=is_small_and_shared,
-        slices=resources.multipliers,
-        begin=Begin.STALLED,
-        patience=lambda: TUNING.tries,
-    ),
-    Strategy(
         name="a small fleet's programs with contacts fixed",
         supports=is_small_and_shared,
         slices=resources.programs,
@@ -169,7 +156,7 @@ STRATEGIES: Final = (
     ),
     Strategy(
         name="programs with the plan's contacts",
-        supports=lambda p: fits_a_program(p) and not is_shared(p),
+        supports=fits_a_program,
         slices=resources.own_contacts,
         patience=lambda: TUNING.tries,
     ),
@@ -263,14 +250,16 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.tries,
     ),
     Strategy(
-        name="multipliers of chains",
-        supports=has_free_starts,
-        slices=continuous.chain_multipliers,
-    ),
-    Strategy(
         name="windows with free starts and resources",
         supports=has_free_starts_with_resources,
         slices=continuous.windows_with_resources,
+        patience=lambda: TUNING.tries,
+    ),
+    Strategy(
+        name="multipliers of chains",
+        supports=has_free_starts,
+        slices=continuous.chain_multipliers,
+        patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="exhaust",

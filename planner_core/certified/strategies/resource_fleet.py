@@ -49,7 +49,7 @@ def plans_and_programs(search: Search) -> Iterator[None]:
     programs = ProgramSearch(
         search.problem, plans.pool, engine.price_search, pricing, search.budget, search.seed
     )
-    # A small fleet has other strategies, which go on when this one has ended.
+    # A small fleet has programs for sets of contacts, and the whole one, when this has ended.
     patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
     num_idle = 0
     while num_idle < patience and not search.best.is_done:

@@ -275,8 +275,7 @@ class ResourceSearch:
     def fix_own_contacts(self) -> bool:
         """Search for a better plan with the contacts of the best one; return whether it is.
 
-        Of all tasks: with those alone that plans took on the way four satellites come to 442.9 in
-        place of 447.6. Rounds of cutting planes cost three times as long and lead no further, nor
+        Of all tasks. Rounds of cutting planes cost three times as long and lead no further, nor
         does HiGHS beyond its first node, which takes a second or two where that took 16.
         """
         if self.best.bound.value < self.best.better + TUNING.room * self._one:
