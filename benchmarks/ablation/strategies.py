@@ -157,6 +157,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "multipliers of passes": _SPACED,
             "windows beside multipliers of passes": _SPACED,
             "streams of windows": _FLEET,
+            "multipliers of a fleet's passes": {"spaced-fleet-2x500": 10.0},
             "a fleet's cutting planes": _FLEET,
             "choices": _RESOURCES | _DELIVERED,
             "windows and choices": _RESOURCES,

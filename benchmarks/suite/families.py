@@ -117,6 +117,9 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_targets=1000, budget_s=30.0, quick_budget_s=12.0, continuous_starts=True
     ),
     "fleet-2x500": Family(num_satellites=2, num_targets=500, budget_s=10.0, quick_budget_s=5.0),
+    "spaced-fleet-2x500": Family(
+        num_satellites=2, num_targets=500, budget_s=10.0, quick_budget_s=None, spacing_s=15.0
+    ),
     "fleet-4x2000": Family(num_satellites=4, num_targets=2000, budget_s=12.0, quick_budget_s=8.0),
     "fleet-24x10000": Family(
         num_satellites=24, num_targets=10_000, budget_s=60.0, quick_budget_s=None, num_draws=1

@@ -16,11 +16,14 @@ from planner_core.certified.dp.elementary import (
     labels_for,
     memory_of,
 )
+from planner_core.certified.driver import Search
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.search import improved
 from planner_core.certified.multipliers.elementary import ascent_on_passes
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound, lagrangian_value
+from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.domain import Agility
 from planner_core.precedence.arcs import arc_network_of
 from planner_core.problem import COLLECT, Floats, Problem
@@ -159,3 +162,24 @@ def test_the_quick_bound_pays_a_target_once_in_each_pass() -> None:
     assert bound.value >= reward
     assert bound.is_elementary
     assert is_proven(problem, bound)
+
+
+@pytest.mark.parametrize("seed", [0, 3, 12])
+def test_a_fleet_s_bound_pays_a_target_once_in_each_pass_too(seed: int) -> None:
+    """Below that of plain paths, from which a fleet's prices come."""
+    problem = spaced_problem(seed, num_accesses=60, num_offers=8, span_s=1000.0)
+    assert sum(len(satellite) > 0 for satellite in problem.satellites) == 2
+
+    def bound(*names: str) -> Bound:
+        best = Incumbent(problem, Budget(), 0.0)
+        Search(best, 0, [one for one in STRATEGIES if one.name in names]).solved()
+        return best.bound
+
+    plain = bound("rule", "multipliers of a fleet's paths")
+    once = bound("rule", "multipliers of a fleet's paths", "multipliers of a fleet's passes")
+    assert once.is_elementary
+    assert not plain.is_elementary
+    assert once.value < plain.value
+    reward = replay(problem, improved(problem, Plan(), 10.0, Budget(), 0)).reward
+    assert once.value >= reward
+    assert is_proven(problem, once)

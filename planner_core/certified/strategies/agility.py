@@ -32,6 +32,7 @@ from planner_core.certified.proofs.certificate import (
 )
 from planner_core.certified.proofs.lagrangian import default_epochs
 from planner_core.certified.sizes import MAX_PAIRS, PAUSE_S
+from planner_core.certified.strategies.supports import is_shared
 from planner_core.certified.tolerances import TAKEN
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import network_of
@@ -109,11 +110,11 @@ class FreeSearch:
         ascent.run(self.best.reward, self.budget.stop)
         self.step(Multipliers(prices=ascent.multipliers))
 
-    def price_passes(self) -> None:
-        """Search for prices by which no target is paid twice in one pass over it."""
+    def price_passes(self, num_epochs: int) -> None:
+        """Search for prices by which no target is paid twice in one pass over it, so long."""
         if self._prices is None:
             self._prices = ascent_on_passes(self.problem, self.seed)
-        self._prices.improve(TUNING.epochs_at_a_time, self.budget.stop)
+        self._prices.improve(num_epochs, self.budget.stop)
         value, prices = self._prices.value, self._prices.multipliers
         self.best.lower(Bound(value=value, proof="lagrangian", prices=prices, is_elementary=True))
         self.best.report("prices")
@@ -265,11 +266,17 @@ def path_multipliers(search: Search) -> Iterator[None]:
 
 
 def pass_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on paths that are paid once for a target in one pass over it."""
-    engine = _engine(search)
+    """Ascend on paths that are paid once for a target in one pass over it.
+
+    A fleet has a bound by paths before, and what the first steps prove is above that.
+    """
+    engine, best = _engine(search), search.best
+    known = best.bound.value
+    num_epochs = TUNING.many_epochs if is_shared(search.problem) else TUNING.epochs_at_a_time
     while not engine.is_priced_out:
-        engine.price_passes()
-        yield
+        engine.price_passes(num_epochs)
+        if best.bound.value < known or best.is_done:
+            yield
 
 
 def windows(search: Search) -> Iterator[None]:

@@ -42,6 +42,7 @@ from planner_core.certified.strategies.supports import (
     is_shared_with_limits,
     is_small_and_shared,
     is_small_free_fleet,
+    is_small_free_fleet_with_choice,
     is_within_reach,
 )
 from planner_core.certified.tuning import TUNING
@@ -108,6 +109,12 @@ STRATEGIES: Final = (
         supports=is_small_free_fleet,
         slices=fleet.windows,
         begin=Begin.STALLED,
+        patience=lambda: TUNING.patience,
+    ),
+    Strategy(
+        name="multipliers of a fleet's passes",
+        supports=is_small_free_fleet_with_choice,
+        slices=agility.pass_multipliers,
         patience=lambda: TUNING.patience,
     ),
     Strategy(

@@ -97,6 +97,11 @@ def is_small_free_fleet(problem: Problem) -> bool:
     return is_free_fleet(problem) and len(problem.opportunities) <= TUNING.small_fleet
 
 
+def is_small_free_fleet_with_choice(problem: Problem) -> bool:
+    """Whether such a fleet may start at several times in an access."""
+    return is_small_free_fleet(problem) and problem.offers_choice
+
+
 def is_large_free_fleet(problem: Problem) -> bool:
     """Whether such a fleet is too large for that."""
     return is_free_fleet(problem) and not is_small_free_fleet(problem)
