@@ -135,6 +135,7 @@ _OF_AGE: Final = {**_FEW_OF_AGE, "half-life-12h-1000": 12.0}
 _FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
 _OF_AGE_SHARED: Final = {"half-life-6h-network-4x400": 20.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
+_SHARED: Final = {"share-fleet-paper-4x500": 12.0, "quality-sun-network-4x300": 15.0}
 _FLEET: Final = {"fleet-4x2000": 12.0, "fleet-2x500": 10.0}
 _STATIONS: Final = {"fleet-stations-4x2000": 60.0}
 _UNEVEN: Final = {
@@ -166,6 +167,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,
             "programs with the plan's contacts": _OWN_CONTACTS,
+            "a fleet's programs with the plan's contacts": _SHARED,
             "plans without the half-life": _AGE_ON_BOARD,
             "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
             "windows by small programs": _FEW_OF_AGE,

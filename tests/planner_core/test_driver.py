@@ -170,6 +170,8 @@ KINDS: Final = {
     "agility": random_problem(1, use_resources=False, num_collects=20),
     "choice": random_problem(1, use_resources=False, num_collects=20, num_offers=2),
     "fleet": random_problem(1, use_resources=False, num_collects=20, num_satellites=2),
+    "fleet with a choice": random_problem(1, use_resources=False, num_collects=20, num_offers=2,
+                                          num_satellites=2),
     "limits": random_problem(1, num_collects=20, num_contacts=2),
     "fleet with limits": random_problem(1, num_collects=20, num_contacts=2, num_satellites=2),
     "limits in motion": random_problem(1, num_collects=20, num_contacts=2, agility=MOVING),

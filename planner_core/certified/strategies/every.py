@@ -143,6 +143,12 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.tries,
     ),
     Strategy(
+        name="a fleet's programs with the plan's contacts",
+        supports=lambda p: fits_a_program(p) and is_shared(p),
+        slices=resources.own_contacts,
+        patience=lambda: TUNING.tries,
+    ),
+    Strategy(
         name="a small fleet's programs with contacts fixed",
         supports=is_small_and_shared,
         slices=resources.programs,
@@ -163,7 +169,7 @@ STRATEGIES: Final = (
     ),
     Strategy(
         name="programs with the plan's contacts",
-        supports=fits_a_program,
+        supports=lambda p: fits_a_program(p) and not is_shared(p),
         slices=resources.own_contacts,
         patience=lambda: TUNING.tries,
     ),

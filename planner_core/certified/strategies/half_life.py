@@ -34,6 +34,7 @@ from planner_core.certified.strategies.resources import (
     choices_from_the_best,
     windows_and_choices,
 )
+from planner_core.certified.strategies.supports import is_shared
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.delivery import without_half_life
@@ -93,9 +94,12 @@ def program_windows(search: Search) -> Iterator[None]:
 
 
 def multipliers(search: Search) -> Iterator[None]:
-    """Lower the bound by multipliers of targets and contacts."""
+    """Lower the bound by multipliers of targets and contacts.
+
+    At first half as long where queues come next, which go on with it.
+    """
     shared = search.engine(Contacts)
-    shared.lower(TUNING.rounds // 2)
+    shared.lower(TUNING.rounds if is_shared(search.problem) else TUNING.rounds // 2)
     yield
     while search.is_promising and not shared.ascent.is_settled:
         shared.lower(TUNING.rounds)
