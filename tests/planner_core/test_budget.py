@@ -102,15 +102,15 @@ def test_fleets_with_continuous_starts_and_resources_work_on_all_threads(
 ) -> None:
     problem = flat_problem(2, num_targets=10, num_contacts=2, use_resources=True, spacing_s=60.0)
     given: list[int] = []
-    solved = Search.solved
+    beside = Search.beside
 
-    def watched(search: Search) -> Solution:
-        given.append(search.budget.num_threads)
-        return solved(search)
+    def watched(search: Search, best: Incumbent, seed: int) -> Search:
+        given.append(best.budget.num_threads)
+        return beside(search, best, seed)
 
-    monkeypatch.setattr(Search, "solved", watched)
+    monkeypatch.setattr(Search, "beside", watched)
     Certified().solve(problem, Budget(num_threads=2), 0)
-    assert given == [2, 2]
+    assert given == [2]
 
 
 def test_agility_alone_leaves_most_of_the_time_to_plans_with_resources(
