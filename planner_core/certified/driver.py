@@ -213,12 +213,13 @@ def close_in(search: Search) -> Iterator[None]:
 def slices_beyond_the_first_plan(search: Search) -> Iterator[None]:
     """Close in; stop after each slice once plans are better than the first, which is the rule's.
 
-    What others make of that plan is worse, and takes as long.
+    What others make of that plan is worse, and takes as long. Where it is the best for some slices
+    they get it after all.
     """
     first = np.inf
-    for _ in close_in(search):
+    for number, _ in enumerate(close_in(search)):
         first = min(first, search.best.reward)
-        if search.best.reward > first:
+        if search.best.reward > first or number >= TUNING.patience:
             yield
 
 

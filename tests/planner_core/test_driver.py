@@ -8,7 +8,15 @@ from typing import Final
 import pytest
 
 from planner_core.budget import Budget, Termination
-from planner_core.certified.driver import Begin, Effort, Search, Slices, Strategy, close_in
+from planner_core.certified.driver import (
+    Begin,
+    Effort,
+    Search,
+    Slices,
+    Strategy,
+    close_in,
+    slices_beyond_the_first_plan,
+)
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.strategies.every import STRATEGIES
@@ -147,6 +155,22 @@ def test_the_slices_of_a_search_beside_are_slices_of_a_strategy() -> None:
     search_by([strategy("a", log.gaining("a", [1.5] * 3)), strategy("b", beside)]).solved()
     # Of the inner search: x and y begin, y gains more. Outside that is a gain of b.
     assert "".join(log.names) == "ax|aay|y|x|"
+
+
+def test_who_is_beside_a_search_gets_its_first_plan_only_where_none_is_better() -> None:
+    """A proof that this is the best may take all the time there is."""
+    log = Log()
+
+    def better(search: Search) -> Iterator[None]:
+        for _ in range(3):
+            yield
+        search.best.offer(Rule().solve(search.problem, Budget(), 0).plan)
+        yield
+        yield
+
+    proving = log.gaining("x", [1.0] * (TUNING.patience + 3))
+    assert len(list(slices_beyond_the_first_plan(search_by([strategy("x", proving)])))) == 3
+    assert len(list(slices_beyond_the_first_plan(search_by([strategy("y", better)])))) == 2
 
 
 def test_engines_are_shared() -> None:
