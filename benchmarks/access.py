@@ -33,8 +33,8 @@ from planner_core.domain import (
     mean_elements,
 )
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
 from planner_core.orbits.sgp4_record import satrec
+from planner_core.orbits.sites import Sites
 
 START = datetime(2019, 1, 1, tzinfo=UTC)
 
@@ -90,11 +90,11 @@ def _targets(lat: Any, lon: Any) -> tuple[Target, ...]:
 
 def ours(case: Case, threads: int = 1) -> int:
     """Return the number of windows, from the elements and the targets on."""
-    places, own = Places.of(case.targets), TargetLimits.of(case.targets)
+    sites, own = Sites.of(case.targets), TargetLimits.of(case.targets)
 
     def windows_of(one: Satellite) -> int:
         path = propagate(one, case.horizon)
-        return len(find_accesses(path, places, Limits.of_targets(one.sensor, own)))
+        return len(find_accesses(path, sites, Limits.of_targets(one.sensor, own)))
 
     with ThreadPoolExecutor(threads) as pool:
         return sum(pool.map(windows_of, case.satellites))

@@ -86,13 +86,13 @@ def pairwise(problem: Problem) -> dict[str, float]:
 
 def groups_of(problem: Problem) -> dict[str, Any]:
     """Return the program for CP-SAT: a group for each set of tasks that exclude each other."""
-    from planner_core.certified.mip.clique_cuts import antichain_cover
+    from planner_core.certified.mip.clique_cuts import clique_cover
     from planner_core.precedence.relation import direct_precedence
 
     rows, offsets = problem.target_opportunities
     groups = [rows[a:b].tolist() for a, b in itertools.pairwise(offsets)]
     for satellite in problem.satellites:
-        offsets, members = antichain_cover(direct_precedence(satellite))
+        offsets, members = clique_cover(direct_precedence(satellite))
         groups += [satellite.rows[members[a:b]].tolist() for a, b in itertools.pairwise(offsets)]
     return {"worth": problem.worth.tolist(), "groups": groups, "limit_s": LIMIT_S}
 

@@ -44,7 +44,7 @@ from planner_core.pins import PinnedAction
 from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
-from planner_core.replanning.known import KnownPrices, prices_of
+from planner_core.replanning.known import KnownMultipliers, multipliers_of
 from planner_core.replanning.plan_before import PlanBefore
 from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question, question_of
@@ -72,7 +72,7 @@ class Day:
     problem: Problem
     plan: Plan
     later_targets: tuple[Target, ...]
-    known: KnownPrices | None
+    known: KnownMultipliers | None
 
     @property
     def base(self) -> tuple[PinnedAction, ...]:
@@ -86,13 +86,13 @@ def base_of(scenario: Scenario, problem: Problem, plan: Plan) -> tuple[PinnedAct
     found = []
     for action in plan.actions:
         row = action.opportunity
-        place = int(table.place[row])
+        site = int(table.site[row])
         is_image = table.kind[row] == COLLECT
         found.append(
             PinnedAction(
                 satellite_id=problem.satellites[int(table.satellite[row])].id,
-                target_id=problem.target_ids[place] if is_image else None,
-                station_id=None if is_image else problem.station_ids[place],
+                target_id=problem.target_ids[site] if is_image else None,
+                station_id=None if is_image else problem.station_ids[site],
                 start=scenario.horizon.instant(action.start_s),
             )
         )
@@ -122,7 +122,7 @@ def day_of(num_satellites: int, num_targets: int) -> Day:
     return Day(
         scenario=scenario, problem=problem, plan=solution.plan,
         later_targets=whole.targets[num_targets:],
-        known=prices_of(solution.proven, problem.target_ids),
+        known=multipliers_of(solution.proven, problem.target_ids),
     )  # fmt: skip
 
 
@@ -152,7 +152,9 @@ def events_of(day: Day) -> Iterator[tuple[str, Scenario]]:
     yield "5 % new targets", replace(asked, targets=(*asked.targets, *day.later_targets))
 
 
-def measure(name: str, scenario: Scenario, known: KnownPrices | None, *, is_brief: bool) -> str:
+def measure(
+    name: str, scenario: Scenario, known: KnownMultipliers | None, *, is_brief: bool
+) -> str:
     """Return a line of the table; a brief one has nothing but the replan."""
     problem = problem_of(scenario)
     question = question_of(scenario, problem)
@@ -241,7 +243,7 @@ def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]
     before = PlanBefore(
         scenario=scenario, opportunities=opportunities, bound=published.proven,
         imaged=frozenset(
-            problem.target_ids[int(problem.opportunities.place[action.opportunity])]
+            problem.target_ids[int(problem.opportunities.site[action.opportunity])]
             for action in published.plan.actions
         ),
     )  # fmt: skip
@@ -257,7 +259,7 @@ def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]
         question = question_of(asked, left, before.asked_by(asked))
         clock.append(time.process_time())
         budget = CpuBudget(LIMIT_S, time.time() + 60.0)
-        solution = solve_replan(question, Certified(), budget, 0, before.prices)
+        solution = solve_replan(question, Certified(), budget, 0, before.multipliers)
         clock.append(time.process_time())
         timeline = replay(left, solution.plan)
         assert timeline.is_valid, timeline.violations

@@ -4,8 +4,8 @@ Agnese et al. 1995, Bensana et al. 1999: each photograph is taken by one of its 
 at all, some cannot be taken together, pairs or triples. There is no time in the files: what
 excludes what is listed. Instances of several orbits share a recorder as well.
 
-The exact search here is the antichain form of the planner's MILP on listed conflicts: cliques in
-place of antichains, the same engine below.
+The exact search here is the clique form of the planner's MILP on listed conflicts: cliques in
+place of cliques, the same engine below.
 """
 
 from __future__ import annotations

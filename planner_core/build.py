@@ -14,7 +14,7 @@ from planner_core.flown import Past, carried, flown_as, given_of, pasts_of
 from planner_core.idling import started, sunlit_from
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from planner_core.orbits.sun import sun_path
 from planner_core.pinning.pinned_problem import pinned_problem
 from planner_core.problem import (
@@ -138,10 +138,10 @@ def _with_frozen(scenario: Scenario, table: Opportunities) -> tuple[Opportunitie
     if made.missing and replan.elements == "newest":
         number = list(frozen)[made.missing[0]]
         action = frozen[number]
-        place = f"target {action.target_id!r}" if action.target_id else "the station"
+        site = f"target {action.target_id!r}" if action.target_id else "the station"
         raise InvalidScenario(
             "frozen_not_kept",
-            f"By its newest elements satellite {action.satellite_id!r} does not see {place} at "
+            f"By its newest elements satellite {action.satellite_id!r} does not see {site} at "
             f"{action.start:%Y-%m-%dT%H:%M:%SZ}: end the freeze before, or skip the action.",
             pointer=f"/replan/base/{number}",
         )
@@ -159,6 +159,6 @@ def _pointing(scenario: Scenario) -> Pointing:
         paths.append(Path(found.step_s, np.ascontiguousarray(nodes)))
     return Pointing(
         paths=tuple(paths),
-        targets_m=Places.of(scenario.targets).position_m,
-        stations_m=Places.of(scenario.ground_stations).position_m,
+        targets_m=Sites.of(scenario.targets).position_m,
+        stations_m=Sites.of(scenario.ground_stations).position_m,
     )

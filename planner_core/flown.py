@@ -100,11 +100,11 @@ def given_of(scenario: Scenario, index: int, task: Flown) -> Given:
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
     stations = {station.id: i for i, station in enumerate(scenario.ground_stations)}
     is_image = task.target_id is not None
-    place = targets[task.target_id or ""] if is_image else stations[task.station_id or ""]
+    site = targets[task.target_id or ""] if is_image else stations[task.station_id or ""]
     horizon = scenario.horizon
     start_s = max(0.0, horizon.offset_s(task.start))
     end_s = min(horizon.duration_s, horizon.offset_s(task.end))
-    return Given(index, COLLECT if is_image else CONTACT, place, start_s, end_s)
+    return Given(index, COLLECT if is_image else CONTACT, site, start_s, end_s)
 
 
 def pasts_of(scenario: Scenario) -> dict[int, Past]:

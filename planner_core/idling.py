@@ -22,7 +22,7 @@ from planner_core.domain import (
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.eclipse import always_sunlit, sunlight
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places, line_of_sight_teme, los_rate_deg_s
+from planner_core.orbits.sites import Sites, line_of_sight_teme, los_rate_deg_s
 from planner_core.orbits.sun import sun_path
 from planner_core.problem import (
     COLLECT,
@@ -137,13 +137,13 @@ def heading_of(scenario: Scenario, index: int, state: State, table: Opportunitie
             free_from_s=free_from_s, line_of_sight=_triple(vector / np.linalg.norm(vector))
         )
     satellite = scenario.satellites[index]
-    place = Places.of([_tracked(scenario, index, attitude, table)])
+    site = Sites.of([_tracked(scenario, index, attitude, table)])
     path = propagate(satellite, Horizon(start=state.at, end=state.at + _A_MOMENT))
     at_s, is_moving = np.zeros(1), satellite.agility.tracks
     return Heading(
         free_from_s=free_from_s,
-        line_of_sight=_triple(line_of_sight_teme(path, place, at_s)[0]),
-        moving_deg_s=_triple(los_rate_deg_s(path, place, at_s)[0]) if is_moving else (0.0,) * 3,
+        line_of_sight=_triple(line_of_sight_teme(path, site, at_s)[0]),
+        moving_deg_s=_triple(los_rate_deg_s(path, site, at_s)[0]) if is_moving else (0.0,) * 3,
     )
 
 
@@ -171,11 +171,11 @@ def _tracked(
                 pointer=f"/states/{position}/attitude/opportunity_id",
             )
         named = scenario.targets if table.kind[row] == COLLECT else scenario.ground_stations
-        return named[int(table.place[row])]
+        return named[int(table.site[row])]
     named, own_id = scenario.targets, attitude.target_id
     if attitude.station_id is not None:
         named, own_id = scenario.ground_stations, attitude.station_id
-    return next(place for place in named if place.id == own_id)
+    return next(site for site in named if site.id == own_id)
 
 
 def _images(scenario: Scenario, index: int, state: State) -> tuple[ImageOnBoard, ...]:

@@ -65,9 +65,9 @@ def _more_than_contacts_take(scenario: Scenario, table: Opportunities) -> str | 
     least = np.full(len(scenario.targets), np.inf)
     collects = np.flatnonzero(table.kind == COLLECT)
     sizes = (length_s * fill_per_s[table.satellite])[collects]
-    np.minimum.at(least, table.place[collects], sizes)
+    np.minimum.at(least, table.site[collects], sizes)
     contacts = np.flatnonzero(table.kind == CONTACT)
-    stations = [scenario.ground_stations[place] for place in table.place[contacts].tolist()]
+    stations = [scenario.ground_stations[site] for site in table.site[contacts].tolist()]
     useful_s = np.maximum(length_s[contacts] - [s.setup_s for s in stations], 0.0)
     gains = np.array([s.downlink_gain for s in stations])
     most = float((useful_s * taken_per_s[table.satellite[contacts]] * gains).sum())
@@ -196,7 +196,7 @@ def _too_long(scenario: Scenario) -> str | None:
 def _longest_access_s(satellite: Satellite) -> float:
     """Return a time that no access exceeds: from one edge of what is seen to the other.
 
-    The satellite is nowhere farther than at its apogee, and nowhere slower; a place on the ground
+    The satellite is nowhere farther than at its apogee, and nowhere slower; a site on the ground
     runs along with it at the Earth's rotation at most.
     """
     rate_rad_s = 2.0 * math.pi / satellite.orbit.period_s

@@ -181,8 +181,8 @@ def _search(
     else:
         asked = None if before is None else before.asked_by(scenario)
         question = replace(question_of(scenario, problem, asked), problem=own)
-        prices = None if before is None else before.prices
-        solution = replanned(question, relieved, solver, budget, seed, prices)
+        multipliers = None if before is None else before.multipliers
+        solution = replanned(question, relieved, solver, budget, seed, multipliers)
     if problem.continuous_starts:
         solution = with_own_starts(problem, solution, budget)
     is_optimal = solution.termination is Termination.OPTIMAL
@@ -234,7 +234,7 @@ def _best_bound(
 def _quick_bound(problem: Problem, reward: float, budget: Budget) -> Bound:
     if problem.continuous_starts:
         return continuous.quick_bound(problem)
-    # Someone who cancels wants the answer now: prices stay rough then.
+    # Someone who cancels wants the answer now: multipliers stay rough then.
     return (
         lagrangian_bound(problem, reward, 0)
         if budget.is_cancelled

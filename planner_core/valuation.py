@@ -29,7 +29,7 @@ def worth_of_opportunities(scenario: Scenario, table: Opportunities) -> Floats:
     """
     target_reward = np.array([target.reward for target in scenario.targets], dtype=np.float64)
     collects = np.flatnonzero(table.kind == COLLECT)
-    target = table.place[collects]
+    target = table.site[collects]
     worth = np.zeros(len(table))
     worth[collects] = worth_of_collects(
         target_reward,
@@ -47,7 +47,7 @@ def clear_probabilities(scenario: Scenario, table: Opportunities, collects: Long
     """Return how likely the sky is clear at the middle of some collects of a table."""
     middle_s = 0.5 * (table.start_s[collects] + table.end_s[collects])
     return clear_probability_of(
-        scenario.forecast, table.place[collects], middle_s, len(scenario.targets)
+        scenario.forecast, table.site[collects], middle_s, len(scenario.targets)
     )
 
 

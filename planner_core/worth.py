@@ -8,7 +8,7 @@ is clear, and of that the part that the objective lets it earn (``share_earned``
 is hangs on the whole plan where delivery counts: solvers and bounds go by the most that it can be,
 the referee by what it is.
 
-Bounds price targets. At a multiplier :math:`\lambda_i \ge 0` a path is paid
+Bounds multiplier targets. At a multiplier :math:`\lambda_i \ge 0` a path is paid
 :math:`w_o = \max(0, v_o - \lambda_i)` for a collect, and the target keeps its *surplus*
 :math:`\max_S W_i(S) - \sum_{o \in S} w_o`, which is :math:`\lambda_i` up to the best worth of its
 collects. For any multipliers no plan earns more than all surpluses and, for each satellite, its

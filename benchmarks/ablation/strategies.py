@@ -12,7 +12,7 @@ from functools import reduce
 from typing import Any, Final
 
 from planner_core.budget import Budget
-from planner_core.certified.driver import Turn
+from planner_core.certified.driver import ActiveStrategy
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.strategies import every
 from planner_core.certified.tuning import TUNING, tune
@@ -85,11 +85,11 @@ class _Idle:
     def __init__(self, *_: object) -> None:
         pass
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Do nothing."""
 
 
-def _all_in_turn(turns: Sequence[Turn]) -> Turn:
+def _all_in_turn(turns: Sequence[ActiveStrategy]) -> ActiveStrategy:
     """Return who has waited longest, whatever the gains."""
     going = [turn for turn in turns if not turn.is_stalled] or turns
     return max(going, key=lambda turn: turn.num_waits)

@@ -168,7 +168,7 @@ def _as_the_benchmark_sees_it(case: Case, table: Opportunities) -> Opportunities
     lines = {name: np.array(getattr(table, name)) for name in ("los_start", "los_end")}
     for index, satellite in enumerate(satellites):
         rows = np.flatnonzero(table.satellite == index)
-        fixed = np.array([sky.fixed(tasks[place]) for place in table.place[rows]]).reshape(-1, 3)
+        fixed = np.array([sky.fixed(tasks[site]) for site in table.site[rows]]).reshape(-1, 3)
 
         def sight(t_s: Floats, own: str = satellite.id, fixed: Floats = fixed) -> Floats:
             return sky.turned(fixed, t_s) - sky.satellite(own, t_s)
@@ -255,7 +255,7 @@ def _observations(problem: Problem, rows: Iterable[int]) -> list[Observation]:
     return [
         Observation(
             satellite_id=problem.satellites[int(table.satellite[row])].id,
-            task_id=problem.target_ids[int(table.place[row])],
+            task_id=problem.target_ids[int(table.site[row])],
             start_s=float(table.start_s[row]),
             end_s=float(table.end_s[row]),
         )

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.clouds.forecast import forecast_of
-from benchmarks.clouds.weather import Floats, Places, Weather, position_km
+from benchmarks.clouds.weather import Floats, Sites, Weather, position_km
 from benchmarks.missions import paper_scenario
 from planner_core.access.scenario_opportunities import ScenarioOpportunities, compute_opportunities
 from planner_core.budget import Budget
@@ -30,15 +30,15 @@ _SKIES_SEED = 30_000
 def clear_images(problem: Problem, scenario: Scenario, rows: list[int], weather: Weather) -> Floats:
     """Return how many of these images are clear, in each of the skies."""
     table = problem.opportunities
-    targets = [scenario.targets[place] for place in table.place[rows].tolist()]
+    targets = [scenario.targets[site] for site in table.site[rows].tolist()]
     lat_deg = np.array([target.lat_deg for target in targets])
-    places = Places(
+    sites = Sites(
         position_km(lat_deg, np.array([target.lon_deg for target in targets])),
         lat_deg,
         (table.start_s[rows] + table.end_s[rows]) / 7200.0,
     )
     draw = np.random.default_rng(_SKIES_SEED)
-    clear: Floats = weather.samples(places, _SKIES, draw).sum(axis=1).astype(np.float64)
+    clear: Floats = weather.samples(sites, _SKIES, draw).sum(axis=1).astype(np.float64)
     return clear
 
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.clouds.weather import Places, Weather, position_km
+from benchmarks.clouds.weather import Sites, Weather, position_km
 from planner_core.domain import Forecast, Scenario, SkySeries
 
 _HOURS: Final = np.arange(25.0)
@@ -17,7 +17,7 @@ def forecast_of(scenario: Scenario, weather: Weather) -> Forecast:
     lat_deg = np.array([target.lat_deg for target in scenario.targets])
     at_km = position_km(lat_deg, np.array([target.lon_deg for target in scenario.targets]))
     hourly = [
-        weather.clear_probability(Places(at_km, lat_deg, np.full(len(lat_deg), hour)))
+        weather.clear_probability(Sites(at_km, lat_deg, np.full(len(lat_deg), hour)))
         for hour in _HOURS
     ]
     series = SkySeries(

@@ -59,7 +59,7 @@ class _Field:
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class Sites:
     """Where and when: positions, latitudes and hours from the start. ``n`` each."""
 
     at_km: Floats
@@ -75,38 +75,38 @@ class Weather:
         self._anomaly = _Field(draw, 3)
         self._known = [_Field(draw, 4) for _ in _SCALES]
 
-    def clear_probability(self, places: Places) -> Floats:
+    def clear_probability(self, sites: Sites) -> Floats:
         """Return what a forecast made at the start says."""
-        skill = _skill(places.at_h)
-        edge = skill * self._forecast(places) - self._threshold(places)
+        skill = _skill(sites.at_h)
+        edge = skill * self._forecast(sites) - self._threshold(sites)
         return np.array([_NORMAL.cdf(z) for z in (edge / np.sqrt(1.0 - skill**2)).tolist()])
 
     def samples(
-        self, places: Places, number: int, draw: np.random.Generator
+        self, sites: Sites, number: int, draw: np.random.Generator
     ) -> npt.NDArray[np.bool_]:
         """Return whether each of some places is clear, in skies drawn. Shape ``(number, n)``."""
-        skill = _skill(places.at_h)
-        scaled = np.column_stack([places.at_km / _ERROR_KM, places.at_h / _ERROR_H])
+        skill = _skill(sites.at_h)
+        scaled = np.column_stack([sites.at_km / _ERROR_KM, sites.at_h / _ERROR_H])
         away = np.linalg.norm(scaled[:, np.newaxis] - scaled[np.newaxis], axis=2)
         root = np.linalg.cholesky(np.exp(-away) + 1e-9 * np.eye(len(away)))
         error = draw.standard_normal((number, len(away))) @ root.T
-        mean = skill * self._forecast(places) - self._threshold(places)
+        mean = skill * self._forecast(sites) - self._threshold(sites)
         clear: npt.NDArray[np.bool_] = mean + np.sqrt(1.0 - skill**2) * error > 0.0
         return clear
 
-    def _forecast(self, places: Places) -> Floats:
+    def _forecast(self, sites: Sites) -> Floats:
         parts = [
             np.sqrt(share)
-            * field.at(np.column_stack([places.at_km / scale_km, places.at_h / scale_h]))
+            * field.at(np.column_stack([sites.at_km / scale_km, sites.at_h / scale_h]))
             for field, (share, scale_km, scale_h) in zip(self._known, _SCALES, strict=True)
         ]
         total: Floats = np.sum(parts, axis=0)
         return total
 
-    def _threshold(self, places: Places) -> Floats:
-        fraction = np.interp(np.abs(places.lat_deg), _CLOUD_LAT_DEG, _CLOUD_FRACTION)
+    def _threshold(self, sites: Sites) -> Floats:
+        fraction = np.interp(np.abs(sites.lat_deg), _CLOUD_LAT_DEG, _CLOUD_FRACTION)
         usual = np.array([_NORMAL.inv_cdf(share) for share in fraction.tolist()])
-        return usual + _ANOMALY * self._anomaly.at(places.at_km / _ANOMALY_KM)
+        return usual + _ANOMALY * self._anomaly.at(sites.at_km / _ANOMALY_KM)
 
 
 def _skill(at_h: Floats) -> Floats:

@@ -48,7 +48,7 @@ def fly(mission: Mission, reference: Reference, limits: Limits) -> Flight:
     shadow = eclipse.Eclipse()
     shadow.sunInMsg.subscribeTo(play.sun)
     shadow.addPlanetToModel(play.earth)
-    shadow.addSpacecraftToModel(play.place)
+    shadow.addSpacecraftToModel(play.site)
     recorder = _Recorder(body, shadow, motors, len(told))
     # One after another in each step: first what moved, then what is to be done about it.
     for rank, model in enumerate(
@@ -124,7 +124,7 @@ class _Playback(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
         self._mission, self._orbit = mission, orbit(mission)
         self._told, self._turns = told, reference
         self.reference = messaging.AttRefMsg()
-        self.place, self.sun = messaging.SCStatesMsg(), messaging.SpicePlanetStateMsg()
+        self.site, self.sun = messaging.SCStatesMsg(), messaging.SpicePlanetStateMsg()
         at_rest = messaging.SpicePlanetStateMsgPayload()
         at_rest.PlanetName = "earth"
         self.earth = messaging.SpicePlanetStateMsg().write(at_rest)
@@ -145,7 +145,7 @@ class _Playback(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
         self.reference.write(wanted, now_ns, self.moduleID)
         where = messaging.SCStatesMsgPayload()
         where.r_BN_N = (1000.0 * satellite_km(self._orbit, now_ns * 1e-9)[0]).tolist()
-        self.place.write(where, now_ns, self.moduleID)
+        self.site.write(where, now_ns, self.moduleID)
         if now_ns % round(_SUN_STEP_S * 1e9) == 0:
             sun = messaging.SpicePlanetStateMsgPayload()
             sun.PlanetName = "sun"

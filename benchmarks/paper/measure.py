@@ -106,7 +106,7 @@ def _judged(
     timeline = replay(problem, solution.plan)
     table = problem.opportunities
     rows = [action.opportunity for action in solution.plan.actions]
-    images = {int(table.place[row]) for row in rows if table.kind[row] == COLLECT}
+    images = {int(table.site[row]) for row in rows if table.kind[row] == COLLECT}
     repeats = sum(violation.code == "duplicate" for violation in timeline.violations)
     proven = _quick_bound(task.reading, task.use_resources, task.num_targets, task.draw)
     return Outcome(

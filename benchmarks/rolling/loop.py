@@ -162,7 +162,7 @@ class Loop:
                 start, end = (
                     START + timedelta(seconds=float(t[row])) for t in (table.start_s, table.end_s)
                 )
-                station = whole.ground_stations[int(table.place[row])]
+                station = whole.ground_stations[int(table.site[row])]
                 if not self.luck.pass_is_lost(number, station.id, start) and end < self.end:
                     found.append((end, number))
         yield from sorted(found)
@@ -210,7 +210,7 @@ class Loop:
         flown = self.fleet[number]
         self._told[number] = {r.target_id for r in flown.reports if r.outcome == "taken"}
         elsewhere = {
-            command.place_id
+            command.site_id
             for other in self.fleet
             if other is not flown
             for command in other.commands
@@ -229,7 +229,7 @@ class Loop:
         base = tuple(
             _pinned(self.satellites[number].id, command)
             for command in flown.commands
-            if command.mode == "contact" or command.place_id in known
+            if command.mode == "contact" or command.site_id in known
         )
         until = flown.safe_until(now)
         satellite = self.satellites[number]
@@ -307,8 +307,8 @@ def _pinned(satellite_id: str, command: Command) -> PinnedAction:
     is_image = command.mode == "collect"
     return PinnedAction(
         satellite_id=satellite_id,
-        target_id=command.place_id if is_image else None,
-        station_id=None if is_image else command.place_id,
+        target_id=command.site_id if is_image else None,
+        station_id=None if is_image else command.site_id,
         start=command.start,
     )
 
@@ -318,14 +318,14 @@ def commands_of(horizon: Horizon, problem: Problem, plan: Plan) -> tuple[Command
     table = problem.opportunities
     found = []
     for action in plan.actions:
-        place = int(table.place[action.opportunity])
+        site = int(table.site[action.opportunity])
         is_image = table.kind[action.opportunity] == COLLECT
         found.append(
             Command(
                 start=horizon.instant(action.start_s),
                 end=horizon.instant(action.end_s),
                 mode="collect" if is_image else "contact",
-                place_id=problem.target_ids[place] if is_image else problem.station_ids[place],
+                site_id=problem.target_ids[site] if is_image else problem.station_ids[site],
             )
         )
     return tuple(sorted(found, key=lambda command: command.start))

@@ -111,7 +111,7 @@ class Command:
     start: datetime
     end: datetime
     mode: Literal["collect", "contact"]
-    place_id: str
+    site_id: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,22 +207,22 @@ class Flown:
             return
         self.battery = battery
         if not is_image:
-            is_lost = self.luck.pass_is_lost(self.number, command.place_id, command.start)
+            is_lost = self.luck.pass_is_lost(self.number, command.site_id, command.start)
             self._write(None, telemetry)
             if not is_lost:
                 self._take_down(r.downlink_per_s * span_s, command.end)
             self.time = command.end
             return
         self.time = command.end
-        if self.luck.image_fails(self.number, command.place_id, command.start):
+        if self.luck.image_fails(self.number, command.site_id, command.start):
             self._write(None, telemetry)
             self._report(command, "failed")
         else:
-            self._write(command.place_id, telemetry + written)
+            self._write(command.site_id, telemetry + written)
             self._report(command, "taken")
 
     def _report(self, command: Command, outcome: Literal["taken", "failed", "skipped"]) -> None:
-        self.reports.append(Report(target_id=command.place_id, at=command.end, outcome=outcome))
+        self.reports.append(Report(target_id=command.site_id, at=command.end, outcome=outcome))
 
     def _write(self, target_id: str | None, share: float) -> None:
         if share > 0.0:

@@ -68,13 +68,13 @@ class Eligibility:
 
     def in_time(self, accesses: Accesses) -> Accesses:
         """Return the accesses to targets as far as they lie between release and due times."""
-        start_s = np.maximum(accesses.start_s, self.release_s[accesses.place])
-        end_s = np.minimum(accesses.end_s, self.due_s[accesses.place])
+        start_s = np.maximum(accesses.start_s, self.release_s[accesses.site])
+        end_s = np.minimum(accesses.end_s, self.due_s[accesses.site])
         kept = start_s < end_s
         if kept.all():
             return replace(accesses, start_s=start_s, end_s=end_s)
         return Accesses(
-            place=accesses.place[kept],
+            site=accesses.site[kept],
             start_s=start_s[kept],
             end_s=end_s[kept],
             starts_cut=accesses.starts_cut[kept],

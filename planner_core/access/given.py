@@ -11,7 +11,7 @@ import numpy as np
 from planner_core.access import opportunities as tasks
 from planner_core.domain import Scenario
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from planner_core.problem import COLLECT, CONTACT, Ints, Longs, Opportunities
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
@@ -24,7 +24,7 @@ class Given(NamedTuple):
 
     satellite: int
     kind: int
-    place: int
+    site: int
     start_s: float
     end_s: float
 
@@ -92,7 +92,7 @@ def _touched(table: Opportunities, task: Given) -> Longs:
     return np.flatnonzero(
         (table.satellite == task.satellite)
         & (table.kind == task.kind)
-        & (table.place == task.place)
+        & (table.site == task.site)
         & (table.access_start_s - MOST_MOVED_S <= task.start_s)
         & (table.access_end_s + MOST_MOVED_S >= task.end_s)
     )
@@ -116,13 +116,13 @@ def _columns(given: Sequence[Given], access: Longs | Ints) -> tasks.Columns:
 
 def _seen(scenario: Scenario, given: Sequence[Given], columns: tasks.Columns) -> Opportunities:
     described = tasks.Described(columns)
-    places = {COLLECT: Places.of(scenario.targets), CONTACT: Places.of(scenario.ground_stations)}
+    sites = {COLLECT: Sites.of(scenario.targets), CONTACT: Sites.of(scenario.ground_stations)}
     for index in sorted({task.satellite for task in given}):
         satellite = scenario.satellites[index]
         path = propagate(satellite, scenario.horizon)
         for kind in sorted({task.kind for task in given if task.satellite == index}):
             described.fill(
-                index, kind, path, places[kind], satellite.sensor.nadir,
+                index, kind, path, sites[kind], satellite.sensor.nadir,
                 with_rates=satellite.agility.tracks,
             )  # fmt: skip
     return described.table()

@@ -81,14 +81,14 @@ class TargetLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limits:
-    """Bounds on angles, one column per kind of limit and one row per place.
+    """Bounds on angles, one column per kind of limit and one row per site.
 
     Attributes
     ----------
     nadir
         The vertical that off-nadir angles are measured from.
     widest_off_nadir_deg, lowest_elevation_deg
-        The loosest bounds over all places: no place is seen outside them.
+        The loosest bounds over all sites: no place is seen outside them.
     codes, signs
         Which angle (``orbits.crossings``), and +1 for "at most" or -1 for "at least".
         Shape ``(m,)``.
@@ -98,7 +98,7 @@ class Limits:
         Where the sun stands over the equator in the middle of the local time that the sensor,
         and the target itself, allow. Shape ``(n, 2, 3)``.
     masks
-        Azimuth-elevation masks, one per place (empty for none), or no masks at all.
+        Azimuth-elevation masks, one per site (empty for none), or no masks at all.
     """
 
     nadir: Nadir
@@ -173,9 +173,9 @@ class Limits:
         )
 
     @classmethod
-    def above_horizon(cls, num_places: int) -> Limits:
+    def above_horizon(cls, num_sites: int) -> Limits:
         """Return the limits of bare visibility."""
-        return cls._above(np.zeros(num_places), ())
+        return cls._above(np.zeros(num_sites), ())
 
     @classmethod
     def _above(cls, elevation_deg: Floats, masks: tuple[Mask, ...]) -> Limits:
@@ -225,8 +225,8 @@ def _table(rows: Sequence[Row]) -> _Table:
     """Return the limits that bind any place at all; NaN is no limit."""
     used = [row for row in rows if not np.isnan(row[2]).all()]
     cosines = [sign * np.cos(np.radians(bound)) for _, sign, bound in used]
-    num_places = len(rows[0][2])
-    thresholds = np.stack(cosines, axis=1) if used else np.empty((num_places, 0))
+    num_sites = len(rows[0][2])
+    thresholds = np.stack(cosines, axis=1) if used else np.empty((num_sites, 0))
     return {
         "codes": np.array([code for code, _, _ in used], dtype=np.int32),
         "signs": np.array([sign for _, sign, _ in used], dtype=np.float64),

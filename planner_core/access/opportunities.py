@@ -22,8 +22,8 @@ from planner_core.domain import (
 )
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris
-from planner_core.orbits.places import (
-    Places,
+from planner_core.orbits.sites import (
+    Sites,
     View,
     line_of_sight_teme,
     los_rate_deg_s,
@@ -106,7 +106,7 @@ def have_room(accesses: Accesses, targets: Sequence[Target]) -> npt.NDArray[np.b
 def _room_ms(accesses: Accesses, targets: Sequence[Target]) -> tuple[Longs, Longs]:
     """Return how long each access's collect is, and how far it can be moved."""
     length_s = np.array([target.collect_s for target in targets], dtype=np.float64)
-    length_ms = np.ceil(length_s * _MS_PER_S - 1e-6).astype(np.int64)[accesses.place]
+    length_ms = np.ceil(length_s * _MS_PER_S - 1e-6).astype(np.int64)[accesses.site]
     return length_ms, _ms(accesses.end_s) - _ms(accesses.start_s) - length_ms
 
 
@@ -150,7 +150,7 @@ def place_contacts(accesses: Accesses, stations: Sequence[GroundStation]) -> Pla
             for station in stations
         ],
         dtype=np.int64,
-    )[accesses.place]
+    )[accesses.site]
     start_ms, end_ms = _ms(accesses.start_s), _ms(accesses.end_s)
     row = np.flatnonzero(end_ms - start_ms >= shortest_ms)
     return row, start_ms[row], end_ms[row]
@@ -176,7 +176,7 @@ def rows_of(
     return {
         "satellite": np.full(len(row), satellite, dtype=np.int32),
         "kind": np.full(len(row), kind, dtype=np.int8),
-        "place": accesses.place[row],
+        "site": accesses.site[row],
         "access": (first_access + row).astype(np.int32),
         "start_s": start_ms / _MS_PER_S,
         "end_s": end_ms / _MS_PER_S,
@@ -198,8 +198,8 @@ def in_order(
     is_collect = whole["kind"] == COLLECT
     rank = np.where(
         is_collect,
-        _rank_of(target_ids, whole["place"], is_collect),
-        _rank_of(station_ids, whole["place"], ~is_collect),
+        _rank_of(target_ids, whole["site"], is_collect),
+        _rank_of(station_ids, whole["site"], ~is_collect),
     )
     order = np.lexsort((rank, whole["kind"], whole["satellite"], whole["end_s"], whole["start_s"]))
     whole["access"] = _numbered(whole["access"][order])
@@ -217,10 +217,10 @@ def _numbered(access: Ints) -> Ints:
     return number[own].astype(np.int32)
 
 
-def _rank_of(ids: Sequence[str], place: Ints, wanted: npt.NDArray[np.bool_]) -> Longs:
+def _rank_of(ids: Sequence[str], site: Ints, wanted: npt.NDArray[np.bool_]) -> Longs:
     rank = np.zeros(max(len(ids), 1), dtype=np.int64)
     rank[sorted(range(len(ids)), key=ids.__getitem__)] = np.arange(len(ids))
-    return np.where(wanted, rank[np.where(wanted, place, 0)], 0)
+    return np.where(wanted, rank[np.where(wanted, site, 0)], 0)
 
 
 class Described:
@@ -247,7 +247,7 @@ class Described:
         satellite: int,
         kind: int,
         ephemeris: Ephemeris,
-        places: Places,
+        sites: Sites,
         nadir: Nadir,
         *,
         with_rates: bool = False,
@@ -258,7 +258,7 @@ class Described:
         )
         for first in range(0, len(all_rows), _CHUNK):
             rows = all_rows[first : first + _CHUNK]
-            there = places.at(self._rows["place"][rows])
+            there = sites.at(self._rows["site"][rows])
             start_s, end_s = self._rows["start_s"][rows], self._rows["end_s"][rows]
             self._seen["los_start"][rows] = line_of_sight_teme(ephemeris, there, start_s)
             self._seen["los_end"][rows] = line_of_sight_teme(ephemeris, there, end_s)

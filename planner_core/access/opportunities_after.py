@@ -40,7 +40,7 @@ def opportunities_after(
     old = np.array(
         [
             places[target.id][0]
-            if target.id in places and _is_same_place(target, places[target.id][1])
+            if target.id in places and _is_same_site(target, places[target.id][1])
             else -1
             for target in scenario.targets
         ],
@@ -78,15 +78,15 @@ def _merged(
     place = np.full(len(known.target_access), -1, dtype=np.int32)
     place[old[old >= 0]] = np.flatnonzero(old >= 0)
     is_collect = table.kind == COLLECT
-    own = np.where(is_collect, place[np.where(is_collect, table.place, 0)], table.place)
+    own = np.where(is_collect, place[np.where(is_collect, table.site, 0)], table.site)
     part = _columns(table)
-    part["place"] = own.astype(np.int32)
+    part["site"] = own.astype(np.int32)
     parts = [{name: values[own >= 0] for name, values in part.items()}]
     access = np.empty(len(old), dtype=known.target_access.dtype)
     access[old >= 0] = known.target_access[old[old >= 0]]
     if found is not None:
         new = _columns(found.opportunities)
-        new["place"] = fresh[new["place"]].astype(np.int32)
+        new["site"] = fresh[new["site"]].astype(np.int32)
         new["access"] = new["access"] + np.int32(len(table))  # beyond those that are known
         parts.append(new)
         access[fresh] = found.target_access
@@ -127,7 +127,7 @@ def is_seen_alike(scenario: Scenario, before: Scenario) -> bool:
     return _bare(scenario) == _bare(before)
 
 
-def _is_same_place(target: Target, before: Target) -> bool:
+def _is_same_site(target: Target, before: Target) -> bool:
     """Return whether a target is imaged as before, whatever it is worth."""
     same = replace(target, name=before.name, reward=before.reward, catalog_id=before.catalog_id)
     return same == before

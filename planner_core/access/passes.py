@@ -12,7 +12,7 @@ from planner_core.access.opportunities import Placed, place_contacts
 from planner_core.access.windows import Accesses
 from planner_core.domain import GroundStation, Resources, Satellite, Scenario
 from planner_core.orbits.ephemeris import Ephemeris, propagate
-from planner_core.orbits.places import Places, elevations_deg
+from planner_core.orbits.sites import Sites, elevations_deg
 from planner_core.problem import (
     CONTACT,
     Downlinks,
@@ -54,7 +54,7 @@ def passes_of(
     resources: Resources,
     stations: Sequence[GroundStation],
     path: Ephemeris,
-    places: Places,
+    sites: Sites,
     accesses: Accesses,
 ) -> Passes:
     """Return the passes of one satellite, one for each of its accesses to ``stations``."""
@@ -68,10 +68,10 @@ def passes_of(
     elevation_deg = np.empty(len(of))
     for begin in range(0, len(of), _CHUNK):
         part = slice(begin, begin + _CHUNK)
-        here = places.at(accesses.place[of[part]])
+        here = sites.at(accesses.site[of[part]])
         elevation_deg[part] = elevations_deg(path, here, time_s[part])
     gain = np.array([station.downlink_gain for station in stations], dtype=np.float64)
-    per_s = gain[accesses.place[of]] * resources.downlink_at(elevation_deg)
+    per_s = gain[accesses.site[of]] * resources.downlink_at(elevation_deg)
     highest_deg = np.maximum.reduceat(elevation_deg, first[:-1]) if len(of) else elevation_deg
     at_top = np.flatnonzero(elevation_deg == highest_deg[of])
     _, top = np.unique(of[at_top], return_index=True)
@@ -114,9 +114,9 @@ def _place_parts(
     row, start_ms, end_ms = place_contacts(accesses, stations)
     rows, starts_ms, ends_ms = [row], [start_ms], [end_ms]
     is_half = [np.zeros(len(row), dtype=np.bool_)]
-    setup_s = np.array([s.setup_s for s in stations], dtype=np.float64)[accesses.place[row]]
+    setup_s = np.array([s.setup_s for s in stations], dtype=np.float64)[accesses.site[row]]
     shortest_s = np.array([s.min_contact_s for s in stations], dtype=np.float64)
-    shortest_ms = np.maximum(shortest_s[accesses.place[row]] * _MS_PER_S - 1e-3, 1.0)
+    shortest_ms = np.maximum(shortest_s[accesses.site[row]] * _MS_PER_S - 1e-3, 1.0)
     parts = [_part_s(passes, row, setup_s, share) for share in _PARTS * has_parts]
     halves = _halves_s(passes, row, setup_s) if has_halves else []
     for number, (start_s, end_s) in enumerate((*parts, *halves)):
@@ -171,11 +171,11 @@ def with_halves_to_share(
     That is where more satellites pass a station at an instant than it has antennas.
     """
     wanted = [np.zeros(len(own.passes), dtype=np.bool_) for own in contacts]
-    for place, station in enumerate(stations):
+    for site, station in enumerate(stations):
         passes = sorted(
             (float(own.passes.start_s[row]), float(own.passes.end_s[row]), index, row)
             for index, own in enumerate(contacts)
-            for row in np.flatnonzero(own.passes.place == place).tolist()
+            for row in np.flatnonzero(own.passes.site == site).tolist()
         )
         running: list[tuple[float, float, int, int]] = []
         for one in passes:
@@ -192,7 +192,7 @@ def with_halves_to_share(
 
 
 def contacts_of(
-    scenario: Scenario, satellite: Satellite, path: Ephemeris, places: Places, found: Accesses
+    scenario: Scenario, satellite: Satellite, path: Ephemeris, sites: Sites, found: Accesses
 ) -> PlacedContacts:
     """Return the contacts of one satellite: in parts too, where part of a pass is worth more.
 
@@ -208,7 +208,7 @@ def contacts_of(
     if not has_parts and not has_halves:
         placed = place_contacts(found, stations)
         return PlacedContacts(found, placed, np.zeros(len(placed[0]), dtype=np.bool_), None)
-    passes = passes_of(resources, stations, path, places, found)
+    passes = passes_of(resources, stations, path, sites, found)
     return _place_parts(found, stations, passes, has_parts=has_parts, has_halves=has_halves)
 
 
@@ -224,7 +224,7 @@ def downlinks_of(
         was worked out to place them is not worked out again.
     """
     stations = scenario.ground_stations
-    places = Places.of(stations)
+    sites = Sites.of(stations)
     rates: dict[int, PassRate] = {}
     for index, satellite in enumerate(scenario.satellites):
         if not scenario.use_resources or not satellite.resources.downlink_by_elevation:
@@ -235,18 +235,18 @@ def downlinks_of(
         placed = known[index] if known else None
         if placed is not None and placed.rates is not None:
             each = _rates_by_pass(placed.passes, placed.rates)
-            begun = zip(table.place[row].tolist(), table.access_start_s[row].tolist(), strict=True)
+            begun = zip(table.site[row].tolist(), table.access_start_s[row].tolist(), strict=True)
             rates |= zip(number.tolist(), map(each.__getitem__, begun), strict=True)
             continue
         accesses = Accesses(
-            place=table.place[row],
+            site=table.site[row],
             start_s=table.access_start_s[row],
             end_s=table.access_end_s[row],
             starts_cut=np.zeros(len(row), dtype=np.bool_),
             ends_cut=np.zeros(len(row), dtype=np.bool_),
         )
         path = propagate(satellite, scenario.horizon)
-        found = passes_of(satellite.resources, stations, path, places, accesses)
+        found = passes_of(satellite.resources, stations, path, sites, accesses)
         rates |= zip(number.tolist(), found.rates.each(), strict=True)
     links = StationLinks(
         gain=np.array([s.downlink_gain for s in stations], dtype=np.float64),
@@ -257,5 +257,5 @@ def downlinks_of(
 
 def _rates_by_pass(passes: Accesses, rates: PassRates) -> dict[tuple[int, float], PassRate]:
     """Return the rate of each pass by its station and start."""
-    begun = zip(passes.place.tolist(), passes.start_s.tolist(), strict=True)
+    begun = zip(passes.site.tolist(), passes.start_s.tolist(), strict=True)
     return dict(zip(begun, rates.each(), strict=True))

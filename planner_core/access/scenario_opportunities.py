@@ -31,7 +31,7 @@ from planner_core.domain import Scenario, Sensor
 from planner_core.orbits.checks import orbit_warnings
 from planner_core.orbits.eclipse import sunlight
 from planner_core.orbits.ephemeris import Ephemeris, propagate
-from planner_core.orbits.places import Places, View, view
+from planner_core.orbits.sites import Sites, View, view
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -169,9 +169,9 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     Cancelled
         The budget was spent first; there is no partial answer.
     """
-    places = _places(scenario)
+    sites = _sites(scenario)
     kinds = (COLLECT, CONTACT) if scenario.use_resources else (COLLECT,)
-    collects = _Collects(scenario, places[COLLECT])
+    collects = _Collects(scenario, sites[COLLECT])
     contact = Limits.of_stations(scenario.ground_stations)
     paths = _Paths(scenario)
     contacts: list[PlacedContacts] = []
@@ -189,8 +189,8 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         num_rows += len(placed[0])
         tasks.check_number(num_rows)
         if scenario.use_resources:
-            found = find_accesses(path, places[CONTACT], contact, budget.stop)
-            contacts.append(contacts_of(scenario, satellite, path, places[CONTACT], found))
+            found = find_accesses(path, sites[CONTACT], contact, budget.stop)
+            contacts.append(contacts_of(scenario, satellite, path, sites[CONTACT], found))
             before_contacts.append(num_accesses)
             num_accesses += len(found)
         lit.append(sunlight(path))
@@ -212,7 +212,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
         collects.note_visible(satellite.sensor, path)
         for kind in kinds:
             described.fill(
-                index, kind, path, places[kind], satellite.sensor.nadir,
+                index, kind, path, sites[kind], satellite.sensor.nadir,
                 with_rates=satellite.agility.tracks,
             )  # fmt: skip
     budget.proceed(Progress(phase="access", fraction=1.0))
@@ -248,10 +248,10 @@ class _Paths:
         return path
 
 
-def _places(scenario: Scenario) -> dict[int, Places]:
+def _sites(scenario: Scenario) -> dict[int, Sites]:
     return {
-        COLLECT: Places.of(scenario.targets),
-        CONTACT: Places.of(scenario.ground_stations),
+        COLLECT: Sites.of(scenario.targets),
+        CONTACT: Sites.of(scenario.ground_stations),
     }
 
 
@@ -265,14 +265,14 @@ def view_at(scenario: Scenario, table: Opportunities, rows: Longs, t_s: Floats) 
     t_s
         One instant for each of the rows, in the horizon.
     """
-    places = _places(scenario)
+    sites = _sites(scenario)
     seen = {field.name: np.empty(len(rows)) for field in fields(View)}
     for index in np.unique(table.satellite[rows]):
         satellite = scenario.satellites[index]
         path = propagate(satellite, scenario.horizon)
         for kind in (COLLECT, CONTACT):
             own = np.flatnonzero((table.satellite[rows] == index) & (table.kind[rows] == kind))
-            there = places[kind].at(table.place[rows[own]])
+            there = sites[kind].at(table.site[rows[own]])
             part = view(path, there, t_s[own], satellite.sensor.nadir)
             for name, values in seen.items():
                 values[own] = getattr(part, name)
@@ -287,10 +287,10 @@ class _Collects:
     ``_REASONS``.
     """
 
-    def __init__(self, scenario: Scenario, places: Places):
+    def __init__(self, scenario: Scenario, sites: Sites):
         self.closeness = np.zeros(len(scenario.targets), dtype=np.int64)
         self._scenario = scenario
-        self._places = places
+        self._sites = sites
         self._limits = TargetLimits.of(scenario.targets)
         self._eligibility = Eligibility.of(scenario.targets, scenario.horizon)
 
@@ -301,16 +301,16 @@ class _Collects:
         scenario, targets = self._scenario, self._scenario.targets
         served = self._eligibility.served_by(sensor)
         limits = Limits.of_targets(sensor, self._limits.at(served))
-        found = find_accesses(path, self._places.at(served), limits, budget.stop)
-        found = replace(found, place=served[found.place].astype(np.int32))
+        found = find_accesses(path, self._sites.at(served), limits, budget.stop)
+        found = replace(found, site=served[found.site].astype(np.int32))
         in_time = self._eligibility.in_time(found)
         placed = tasks.place_collects(
             in_time, targets, scenario.collect_spacing_s, scenario.collect_alignment
         )
-        self._raise_to(ACCESS_TOO_SHORT, found.place)
-        self._raise_to(OUTSIDE_TIMES, found.place[tasks.have_room(found, targets)])
-        self._raise_to(BETWEEN_STARTS, in_time.place[tasks.have_room(in_time, targets)])
-        self._raise_to(ACCESS_FOUND, in_time.place[placed[0]])
+        self._raise_to(ACCESS_TOO_SHORT, found.site)
+        self._raise_to(OUTSIDE_TIMES, found.site[tasks.have_room(found, targets)])
+        self._raise_to(BETWEEN_STARTS, in_time.site[tasks.have_room(in_time, targets)])
+        self._raise_to(ACCESS_FOUND, in_time.site[placed[0]])
         return in_time, placed
 
     def note_visible(self, sensor: Sensor, path: Ephemeris) -> None:
@@ -324,8 +324,8 @@ class _Collects:
         unseen = np.flatnonzero(self.closeness < best)
         if not len(unseen):
             return
-        seen = find_accesses(path, self._places.at(unseen), Limits.above_horizon(len(unseen)))
-        visible = unseen[seen.place]
+        seen = find_accesses(path, self._sites.at(unseen), Limits.above_horizon(len(unseen)))
+        visible = unseen[seen.site]
         np.maximum.at(self.closeness, visible, best[visible])
 
     def _raise_to(self, reason: int, targets: npt.NDArray[np.integer]) -> None:

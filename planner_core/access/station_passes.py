@@ -15,7 +15,7 @@ from planner_core.access.limits import Limits
 from planner_core.access.windows import Accesses, find_accesses
 from planner_core.domain import GroundStation, Horizon, Satellite
 from planner_core.orbits.ephemeris import Ephemeris, propagate
-from planner_core.orbits.places import Places, elevations_deg
+from planner_core.orbits.sites import Sites, elevations_deg
 
 Floats = npt.NDArray[np.float64]
 
@@ -64,13 +64,13 @@ def station_passes(
     PropagationFailed
         SGP4 stops before the end of the horizon.
     """
-    places = Places.of(stations)
+    sites = Sites.of(stations)
     limits = Limits.of_stations(stations)
     found: list[StationPass] = []
     for index, satellite in enumerate(satellites):
         path = propagate(satellite, horizon)
-        accesses = find_accesses(path, places, limits)
-        found += _with_culminations(index, path, places, accesses)
+        accesses = find_accesses(path, sites, limits)
+        found += _with_culminations(index, path, sites, accesses)
     return sorted(found, key=lambda one: (one.aos_s, one.los_s, one.satellite, one.station))
 
 
@@ -93,16 +93,16 @@ def overlapping(passes: Sequence[StationPass]) -> list[list[int]]:
 
 
 def _with_culminations(
-    index: int, path: Ephemeris, places: Places, accesses: Accesses
+    index: int, path: Ephemeris, sites: Sites, accesses: Accesses
 ) -> Iterator[StationPass]:
     if not len(accesses):
         return
-    tca_s = _culmination_s(path, places.at(accesses.place), accesses.start_s, accesses.end_s)
-    highest_deg = elevations_deg(path, places.at(accesses.place), tca_s)
+    tca_s = _culmination_s(path, sites.at(accesses.site), accesses.start_s, accesses.end_s)
+    highest_deg = elevations_deg(path, sites.at(accesses.site), tca_s)
     for row in range(len(accesses)):
         yield StationPass(
             satellite=index,
-            station=int(accesses.place[row]),
+            station=int(accesses.site[row]),
             aos_s=float(accesses.start_s[row]),
             tca_s=float(tca_s[row]),
             los_s=float(accesses.end_s[row]),
@@ -112,7 +112,7 @@ def _with_culminations(
         )
 
 
-def _culmination_s(path: Ephemeris, here: Places, start_s: Floats, end_s: Floats) -> Floats:
+def _culmination_s(path: Ephemeris, here: Sites, start_s: Floats, end_s: Floats) -> Floats:
     """Return when the satellite is highest in each window: samples, then a golden section.
 
     Shape ``(n,)`` each. A window may hold several rises (a high orbit stays in sight for long), so
@@ -145,7 +145,7 @@ def _culmination_s(path: Ephemeris, here: Places, start_s: Floats, end_s: Floats
     return np.asarray(candidates[best, np.arange(len(top_s))])
 
 
-def _highest_sample_s(path: Ephemeris, here: Places, start_s: float, end_s: float) -> float:
+def _highest_sample_s(path: Ephemeris, here: Sites, start_s: float, end_s: float) -> float:
     t_s = np.linspace(start_s, end_s, max(2, math.ceil((end_s - start_s) / _STEP_S) + 1))
     elevation_deg = elevations_deg(path, here.at(np.zeros(len(t_s), dtype=np.int32)), t_s)
     return float(t_s[np.argmax(elevation_deg)])

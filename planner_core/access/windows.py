@@ -18,8 +18,8 @@ from planner_core.access.limits import Limits
 from planner_core.orbits.ephemeris import Ephemeris
 from planner_core.orbits.frames import EARTH_POLAR_RADIUS_M
 from planner_core.orbits.mask import Mask, windows_above_mask
-from planner_core.orbits.places import Places
 from planner_core.orbits.search import GROUP, find_windows
+from planner_core.orbits.sites import Sites
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -39,39 +39,39 @@ class Accesses:
 
     Attributes
     ----------
-    place
-        Index of the place.
+    site
+        Index of the site.
     start_s, end_s
         Seconds from the start of the horizon, rounded inward to the millisecond.
     starts_cut, ends_cut
         Whether the horizon's start or end cuts the window.
     """
 
-    place: Ints
+    site: Ints
     start_s: Floats
     end_s: Floats
     starts_cut: Bools
     ends_cut: Bools
 
     def __len__(self) -> int:
-        return len(self.place)
+        return len(self.site)
 
 
 def find_accesses(
-    ephemeris: Ephemeris, places: Places, limits: Limits, stop: Bytes | None = None
+    ephemeris: Ephemeris, sites: Sites, limits: Limits, stop: Bytes | None = None
 ) -> Accesses:
-    """Return all accesses of a satellite to each place over the horizon.
+    """Return all accesses of a satellite to each site over the horizon.
 
     Complete for windows and gaps that a millisecond can show. When ``stop[0]`` becomes
     non-zero the search ends early with the accesses found so far.
     """
     coarse, fine = _caps(ephemeris, limits)
-    place, windows = find_windows(
+    site, windows = find_windows(
         ephemeris.track(limits.nadir),
         ephemeris.step_s,
         coarse,
         fine,
-        _place_vectors(places, limits),
+        _site_vectors(sites, limits),
         limits.codes,
         limits.signs,
         limits.thresholds,
@@ -79,21 +79,21 @@ def find_accesses(
     )
     windows = np.clip(windows, 0.0, ephemeris.duration_s)
     if any(limits.masks):
-        place, windows = _cut_by_masks(ephemeris, places, limits.masks, place, windows)
-    return _rounded_inward(place, windows, ephemeris.duration_s)
+        site, windows = _cut_by_masks(ephemeris, sites, limits.masks, site, windows)
+    return _rounded_inward(site, windows, ephemeris.duration_s)
 
 
-def _place_vectors(places: Places, limits: Limits) -> Floats:
-    own = np.stack([places.position_m, places.up], axis=1)
+def _site_vectors(sites: Sites, limits: Limits) -> Floats:
+    own = np.stack([sites.position_m, sites.up], axis=1)
     return np.ascontiguousarray(np.concatenate([own, limits.meridians], axis=1))
 
 
-def _rounded_inward(place: Ints, windows: Floats, duration_s: float) -> Accesses:
+def _rounded_inward(site: Ints, windows: Floats, duration_s: float) -> Accesses:
     start_ms = np.ceil(windows[:, 0] * 1000.0 - _ROUNDING_MS)
     end_ms = np.floor(windows[:, 1] * 1000.0 + _ROUNDING_MS)
     kept = end_ms > start_ms
     return Accesses(
-        place=place[kept],
+        site=site[kept],
         start_s=start_ms[kept] / 1000.0,
         end_s=end_ms[kept] / 1000.0,
         starts_cut=windows[kept, 0] <= 0.0,
@@ -103,16 +103,16 @@ def _rounded_inward(place: Ints, windows: Floats, duration_s: float) -> Accesses
 
 def _cut_by_masks(
     ephemeris: Ephemeris,
-    places: Places,
+    sites: Sites,
     masks: tuple[Mask, ...],
-    place: Ints,
+    site: Ints,
     windows: Floats,
 ) -> tuple[Ints, Floats]:
     parts = []
     for index, mask in enumerate(masks):
-        own = windows[place == index]
+        own = windows[site == index]
         if mask:
-            own = windows_above_mask(ephemeris, places.at(np.array([index])), mask, own)
+            own = windows_above_mask(ephemeris, sites.at(np.array([index])), mask, own)
         parts.append(own)
     counts = [len(part) for part in parts]
     return np.repeat(np.arange(len(masks), dtype=np.int32), counts), np.concatenate(parts)

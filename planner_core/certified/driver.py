@@ -155,7 +155,7 @@ class Search:
         return self.best.solution(self.proof() if self.proof else None)
 
 
-class Turn:
+class ActiveStrategy:
     """A strategy that has begun."""
 
     def __init__(self, strategy: Strategy, search: Search) -> None:
@@ -187,25 +187,25 @@ def close_in(search: Search) -> Iterator[None]:
     """
     like = search.problem if search.like is None else search.like
     left = [one for one in search.strategies if one.supports(like)]
-    turns: list[Turn] = []
-    while left or turns:
+    active: list[ActiveStrategy] = []
+    while left or active:
         if search.best.is_done and not (left and left[0].begin is Begin.ALWAYS):
             return
         is_next = left and left[0].begin is not Begin.STALLED
-        if is_next or (left and all(turn.is_stalled for turn in turns)):
-            turns.append(Turn(left.pop(0), search))
-            chosen = turns[-1]
+        if is_next or (left and all(one.is_stalled for one in active)):
+            active.append(ActiveStrategy(left.pop(0), search))
+            chosen = active[-1]
         else:
-            chosen = _chosen(turns)
-        for turn in turns:
-            turn.num_waits += 1
+            chosen = _chosen(active)
+        for one in active:
+            one.num_waits += 1
         reward = search.best.reward
         chosen.go_on()
         search.num_idle = 0 if chosen.num_idle == 0 else search.num_idle + 1
         if search.best.reward > reward:
-            for turn in turns:
-                turn.num_idle = 0
-        turns = [turn for turn in turns if not turn.has_ended]
+            for one in active:
+                one.num_idle = 0
+        active = [one for one in active if not one.has_ended]
         if not chosen.has_ended:
             yield
 
@@ -223,10 +223,10 @@ def slices_beyond_the_first_plan(search: Search) -> Iterator[None]:
             yield
 
 
-def _chosen(turns: Sequence[Turn]) -> Turn:
+def _chosen(active: Sequence[ActiveStrategy]) -> ActiveStrategy:
     """Return who has waited too long, or else has gained most."""
-    going = [turn for turn in turns if not turn.is_stalled] or turns
-    longest = max(going, key=lambda turn: turn.num_waits)
+    going = [one for one in active if not one.is_stalled] or active
+    longest = max(going, key=lambda one: one.num_waits)
     if longest.num_waits >= TUNING.several:
         return longest
-    return max(going, key=lambda turn: (turn.gain, turn.num_waits))
+    return max(going, key=lambda one: (one.gain, one.num_waits))

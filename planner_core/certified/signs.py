@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-FREE: Final = -1
-"""Holder of a target that no task images."""
+UNASSIGNED: Final = -1
+"""No task images the target."""
 ELSEWHERE: Final = -2
-"""Another satellite holds the target."""
+"""Another satellite images the target."""
 FIXED: Final = -3
 """Another satellite must keep it."""
 

@@ -66,13 +66,13 @@ class Tuning:
         energy is an estimate.
     fine, coarse
         Levels of the recorder that the smallest collect fills, where a proof counts and where many
-        prices are tried; the first also of energy, where contacts are named at first.
+        multipliers are tried; the first also of energy, where contacts are named at first.
     units_per_reward
-        In which exact programmes count a typical target's worth, where many prices are tried.
+        In which exact programmes count a typical target's worth, where many multipliers are tried.
     max_units
         Units of worth that a bound by exact programmes may count.
-    price_shares
-        Of the prices by agility alone, at which resources are asked.
+    multiplier_shares
+        Of the multipliers by agility alone, at which resources are asked.
     latency_work
         Opportunities times rounds of a quick bound where images lose worth as they age; a second.
     first_goal
@@ -104,7 +104,7 @@ class Tuning:
         Of the window search in a turn; ``little`` of them beside an ascent on passes. Of a step
         under resources, at most.
     disturbance
-        Largest share of a plan, or of prices, that a random move changes.
+        Largest share of a plan, or of multipliers, that a random move changes.
 
     near
         Share of a reward that a task may cost and yet be in the best plans.
@@ -166,7 +166,7 @@ class Tuning:
     fine: int = 8
     coarse: int = 2
     max_units: int = 2000
-    price_shares: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    multiplier_shares: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
     latency_work: int = 100_000
     first_goal: float = 0.95
 

@@ -44,10 +44,10 @@ from planner_core.domain.orbit_ephemeris import (
     OrbitEphemeris,
 )
 from planner_core.domain.outages import Outage
-from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Curve, Quality
 from planner_core.domain.replan import Flown, Promise, Replan, Stability
 from planner_core.domain.scenario import CollectAlignment, Dynamics, Scenario
+from planner_core.domain.sites import GroundStation, Target
 from planner_core.domain.spacecraft import (
     Agility,
     LookSide,

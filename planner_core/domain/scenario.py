@@ -13,9 +13,9 @@ from planner_core.domain.forecast import Forecast
 from planner_core.domain.horizon import Horizon
 from planner_core.domain.objective import Objective
 from planner_core.domain.outages import Outage
-from planner_core.domain.places import GroundStation, Target
 from planner_core.domain.quality import Quality
 from planner_core.domain.replan import Replan
+from planner_core.domain.sites import GroundStation, Target
 from planner_core.domain.spacecraft import Satellite
 from planner_core.domain.states import State, check_states
 from planner_core.errors import InvalidScenario

@@ -52,7 +52,7 @@ def next_action(
         if row != kept:
             if track.blocked[row]:
                 continue
-            if unimaged_only and not track.is_contact[row] and collected[track.place[row]]:
+            if unimaged_only and not track.is_contact[row] and collected[track.site[row]]:
                 continue
             if kept < m and not may_follow(track.transitions, row, kept):
                 continue

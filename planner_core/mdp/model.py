@@ -78,7 +78,7 @@ def task_reward(
         if guidance.is_contact_by_wait:
             counted_s = waited_s
         reward += guidance.contact_reward_per_s * counted_s
-    elif not collected[track.place[row]]:
+    elif not collected[track.site[row]]:
         reward += discount * worth[row]
     if track.use_resources:
         if battery_after <= track.resources.battery_min:
@@ -189,7 +189,7 @@ class Model:
         images = state.collected
         is_image = not self.track.is_contact[row]
         if is_image and counts_as_made(self.track, self.guidance, battery, recorder):
-            images = images | {int(self.track.place[row])}
+            images = images | {int(self.track.site[row])}
         taken = State(cursor=row, last=row, battery=battery, recorder=recorder, collected=images)
         return Step(state=taken, reward=float(reward), sojourn_s=sojourn_s)
 
@@ -197,6 +197,6 @@ class Model:
         return may_wait(self.track, state.last, row, state.battery, state.recorder, self.is_hard)
 
     def _mask(self, state: State) -> Bytes:
-        mask = np.zeros(int(self.track.place.max(initial=-1)) + 1, dtype=np.uint8)
+        mask = np.zeros(int(self.track.site.max(initial=-1)) + 1, dtype=np.uint8)
         mask[list(state.collected)] = 1
         return mask

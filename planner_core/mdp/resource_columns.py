@@ -83,7 +83,7 @@ def resource_columns(problem: Problem, satellite: SatelliteProblem) -> ResourceC
     telemetry = r.telemetry_per_s * duration_s
     # Telemetry fills the recorder until the setup of a contact is over.
     setup_s = np.zeros(len(satellite))
-    setup_s[contact] = problem.downlinks.stations.setup_s[satellite.place[contact]]
+    setup_s[contact] = problem.downlinks.stations.setup_s[satellite.site[contact]]
     setup_s = np.minimum(setup_s, duration_s)
     physical = problem.dynamics == "physical"
     sunlit = satellite.sunlight.seconds_until

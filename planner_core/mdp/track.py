@@ -48,7 +48,7 @@ class Track(NamedTuple):
     start_s: Floats
     end_s: Floats
     is_contact: Bytes
-    place: Ints
+    site: Ints
     first_offer: Ints
     blocked: Bytes
     near_from: Ints
@@ -87,7 +87,7 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
         start_s=satellite.start_s,
         end_s=satellite.end_s,
         is_contact=is_contact,
-        place=satellite.place,
+        site=satellite.site,
         first_offer=first_offer,
         blocked=blocked,
         near_from=near_spans(satellite.transitions)[0],

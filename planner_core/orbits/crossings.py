@@ -89,7 +89,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 
 @inlined
-def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
+def limit_value(limit: Limit, cubic: Floats, site: Floats, t: float) -> Value:
     """Return g and its rate at ``t`` seconds after the interval's start.
 
     Parameters
@@ -98,15 +98,15 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
         Code; +1 for "angle at most" or -1 for "at least"; ``sign * cos(bound)``.
     cubic
         One interval of a track. Shape ``(4, 9)``.
-    place
-        Position (m) and vertical of the place, and the middle meridians of the two limits of
+    site
+        Position (m) and vertical of the site, and the middle meridians of the two limits of
         local time. Shape ``(4, 3)``.
     """
     code, sign, threshold = limit
-    x, dx = (place[1, 0], place[1, 1], place[1, 2]), (0.0, 0.0, 0.0)
+    x, dx = (site[1, 0], site[1, 1], site[1, 2]), (0.0, 0.0, 0.0)
     y, dy = _at(cubic, _POSITION, t), _rate(cubic, _POSITION, t)
     if code <= ELEVATION:
-        y = (y[0] - place[0, 0], y[1] - place[0, 1], y[2] - place[0, 2])
+        y = (y[0] - site[0, 0], y[1] - site[0, 1], y[2] - site[0, 2])
         if code == OFF_NADIR:
             x, dx = _at(cubic, _VERTICAL, t), _rate(cubic, _VERTICAL, t)
     elif code == SUN_ELEVATION:
@@ -114,14 +114,14 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
     elif code in (LOCAL_TIME, OWN_LOCAL_TIME):
         sun, sun_rate = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
         row = 2 + code - LOCAL_TIME
-        x = (place[row, 0], place[row, 1], place[row, 2])
+        x = (site[row, 0], site[row, 1], site[row, 2])
         y, dy = (sun[0], sun[1], 0.0), (sun_rate[0], sun_rate[1], 0.0)
     elif code == LOOK_SIDE:
-        x = (place[0, 0], place[0, 1], place[0, 2])
+        x = (site[0, 0], site[0, 1], site[0, 2])
         y, dy = _cross(y, dy), _cross(y, _rate_of_rate(cubic, _POSITION, t))
     elif code == SUN_EXCLUSION:
         # The sun against the way from the place to the satellite: beyond it, seen from there.
-        y = (y[0] - place[0, 0], y[1] - place[0, 1], y[2] - place[0, 2])
+        y = (y[0] - site[0, 0], y[1] - site[0, 1], y[2] - site[0, 2])
         x, dx = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
     elif code == HEADING:
         x = (0.0, 0.0, 1.0)
@@ -147,12 +147,12 @@ def limit_value(limit: Limit, cubic: Floats, place: Floats, t: float) -> Value:
 
 @inner
 def _root(
-    limit: Limit, cubic: Floats, place: Floats, a: float, b: float, g_a: float, g_b: float
+    limit: Limit, cubic: Floats, site: Floats, a: float, b: float, g_a: float, g_b: float
 ) -> float:
     """Return where g changes sign between ``a`` and ``b``: Newton, or bisection if it leaves."""
     t = a + (b - a) * g_a / (g_a - g_b)
     for _ in range(80):
-        g, rate = limit_value(limit, cubic, place, t)
+        g, rate = limit_value(limit, cubic, site, t)
         if (g >= 0.0) == (g_a >= 0.0):
             a = t
         else:
@@ -168,7 +168,7 @@ def _root(
 
 @inner
 def _turn(
-    limit: Limit, cubic: Floats, place: Floats, a: float, b: float, at_a: Value, at_b: Value
+    limit: Limit, cubic: Floats, site: Floats, a: float, b: float, at_a: Value, at_b: Value
 ) -> float:
     """Return an instant near the extremum where g has the other sign, or ``_NO_TURN``.
 
@@ -184,7 +184,7 @@ def _turn(
             if (g_a + rate_a * meet_s >= 0.0) == (g_a >= 0.0):
                 return _NO_TURN
         t = 0.5 * (a + b)
-        g, rate = limit_value(limit, cubic, place, t)
+        g, rate = limit_value(limit, cubic, site, t)
         if (g >= 0.0) != (g_a >= 0.0):
             return t
         if rate == 0.0:
@@ -200,7 +200,7 @@ def _turn(
 def crossings(
     limit: Limit,
     cubic: Floats,
-    place: Floats,
+    site: Floats,
     step_s: float,
     at_0: Value,
     at_1: Value,
@@ -213,15 +213,15 @@ def crossings(
     """
     inside = at_0[0] >= 0.0
     if inside != (at_1[0] >= 0.0):
-        out[0] = _root(limit, cubic, place, 0.0, step_s, at_0[0], at_1[0])
+        out[0] = _root(limit, cubic, site, 0.0, step_s, at_0[0], at_1[0])
         return 1
     heads_over = at_0[1] < 0.0 < at_1[1] if inside else at_0[1] > 0.0 > at_1[1]
     if not heads_over:
         return 0
-    turn = _turn(limit, cubic, place, 0.0, step_s, at_0, at_1)
+    turn = _turn(limit, cubic, site, 0.0, step_s, at_0, at_1)
     if turn == _NO_TURN:
         return 0
-    g_turn = limit_value(limit, cubic, place, turn)[0]
-    out[0] = _root(limit, cubic, place, 0.0, turn, at_0[0], g_turn)
-    out[1] = _root(limit, cubic, place, turn, step_s, g_turn, at_1[0])
+    g_turn = limit_value(limit, cubic, site, turn)[0]
+    out[0] = _root(limit, cubic, site, 0.0, turn, at_0[0], g_turn)
+    out[1] = _root(limit, cubic, site, turn, step_s, g_turn, at_1[0])
     return 2

@@ -11,7 +11,7 @@ from planner_core.domain import GroundStation
 from planner_core.orbits import frames
 from planner_core.orbits.ephemeris import Ephemeris
 from planner_core.orbits.mask import mask_elevation_deg
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 
 Floats = npt.NDArray[np.float64]
 
@@ -51,10 +51,10 @@ def visibility_ring(station: GroundStation, altitude_m: float) -> tuple[Floats, 
         above = mask_elevation_deg(station.elevation_mask, azimuth_deg)
         elevation_deg = np.maximum(elevation_deg, above)
     azimuth, elevation = np.radians(azimuth_deg)[:, None], np.radians(elevation_deg)[:, None]
-    place = Places.of([station])
-    level = np.sin(azimuth) * place.east + np.cos(azimuth) * place.north
-    sight = np.cos(elevation) * level + np.sin(elevation) * place.up
-    lon_deg, lat_deg, _ = frames.itrf_to_geodetic(_at_altitude(place.position_m, sight, altitude_m))
+    site = Sites.of([station])
+    level = np.sin(azimuth) * site.east + np.cos(azimuth) * site.north
+    sight = np.cos(elevation) * level + np.sin(elevation) * site.up
+    lon_deg, lat_deg, _ = frames.itrf_to_geodetic(_at_altitude(site.position_m, sight, altitude_m))
     return lon_deg, lat_deg
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.orbits.ephemeris import Ephemeris
-from planner_core.orbits.places import Places, azimuth_elevation_deg
+from planner_core.orbits.sites import Sites, azimuth_elevation_deg
 
 Floats = npt.NDArray[np.float64]
 Mask = tuple[tuple[float, float], ...]
@@ -33,9 +33,7 @@ def mask_elevation_deg(mask: Mask, azimuth_deg: Floats) -> Floats:
     return np.asarray(np.interp(azimuth_deg, azimuth, elevation, period=360.0))
 
 
-def windows_above_mask(
-    ephemeris: Ephemeris, station: Places, mask: Mask, windows: Floats
-) -> Floats:
+def windows_above_mask(ephemeris: Ephemeris, station: Sites, mask: Mask, windows: Floats) -> Floats:
     """Return the parts of a station's windows that lie above its mask.
 
     Parameters
@@ -65,7 +63,7 @@ def windows_above_mask(
     return np.concatenate([np.empty((0, 2)), *parts])
 
 
-def _repeat(station: Places, t_s: Floats) -> Places:
+def _repeat(station: Sites, t_s: Floats) -> Sites:
     return station.at(np.zeros(len(t_s), dtype=np.int32))
 
 

@@ -28,7 +28,7 @@ def find_windows(
     step_s: float,
     coarse: Floats,
     fine: Floats,
-    places: Floats,
+    sites: Floats,
     codes: Ints,
     signs: Floats,
     thresholds: Floats,
@@ -43,7 +43,7 @@ def find_windows(
     coarse, fine
         Caps: unit vector, and cosine of the radius outside which no place can meet the
         limits, for each ``GROUP`` of intervals and for each interval. Shape ``(k, 4)``.
-    places
+    sites
         Position, vertical and two meridians (see ``limit_value``). Shape ``(n, 4, 3)``.
     codes, signs, thresholds
         The limits: shapes ``(m,)``, ``(m,)`` and ``(n, m)``.
@@ -52,36 +52,36 @@ def find_windows(
 
     Returns
     -------
-    Index of the place ``(k,)``; start and end in seconds ``(k, 2)``.
+    Index of the site ``(k,)``; start and end in seconds ``(k, 2)``.
     """
     own = np.empty((len(track) * (len(codes) + 1) + 1, 2))
-    place = np.empty(256, dtype=np.int32)
+    site = np.empty(256, dtype=np.int32)
     windows = np.empty((256, 2))
     found = 0
-    for p in range(len(places)):
+    for p in range(len(sites)):
         if stop[0]:
             break
-        num_own = _windows_of_place(
-            track, step_s, coarse, fine, places[p], codes, signs, thresholds[p], own
+        num_own = _windows_of_site(
+            track, step_s, coarse, fine, sites[p], codes, signs, thresholds[p], own
         )
-        if found + num_own > len(place):
+        if found + num_own > len(site):
             room = 2 * (found + num_own)
-            place = np.concatenate((place, np.empty(room - len(place), dtype=np.int32)))
+            site = np.concatenate((site, np.empty(room - len(site), dtype=np.int32)))
             windows = np.concatenate((windows, np.empty((room - len(windows), 2))))
         for i in range(num_own):
-            place[found] = p
+            site[found] = p
             windows[found, 0], windows[found, 1] = own[i, 0], own[i, 1]
             found += 1
-    return place[:found], windows[:found]
+    return site[:found], windows[:found]
 
 
 @inner
-def _windows_of_place(
+def _windows_of_site(
     track: Floats,
     step_s: float,
     coarse: Floats,
     fine: Floats,
-    place: Floats,
+    site: Floats,
     codes: Ints,
     signs: Floats,
     thresholds: Floats,
@@ -91,7 +91,7 @@ def _windows_of_place(
     value = np.empty((num_limits + 1, 2))
     value_node = np.full(num_limits, -1)
     events = np.empty((2 * num_limits, 2))
-    x, y, z = place[0]
+    x, y, z = site[0]
     radius = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / radius, y / radius, z / radius
     found, open_s, last = 0, _CLOSED, -1
@@ -108,7 +108,7 @@ def _windows_of_place(
                 found, open_s = found + 1, _CLOSED
             last = k
             holding, num_events = _events_of_interval(
-                k, track[k], step_s, place, codes, signs, thresholds, value, value_node, events
+                k, track[k], step_s, site, codes, signs, thresholds, value, value_node, events
             )
             if holding == num_limits and open_s == _CLOSED:
                 open_s = k * step_s
@@ -131,7 +131,7 @@ def _events_of_interval(
     k: int,
     cubic: Floats,
     step_s: float,
-    place: Floats,
+    site: Floats,
     codes: Ints,
     signs: Floats,
     thresholds: Floats,
@@ -152,11 +152,11 @@ def _events_of_interval(
         if value_node[m] == k:
             at_0 = (value[m, 0], value[m, 1])
         else:
-            at_0 = limit_value(limit, cubic, place, 0.0)
-        at_1 = limit_value(limit, cubic, place, step_s)
+            at_0 = limit_value(limit, cubic, site, 0.0)
+        at_1 = limit_value(limit, cubic, site, step_s)
         value[m, 0], value[m, 1] = at_1
         value_node[m] = k + 1
-        count = crossings(limit, cubic, place, step_s, at_0, at_1, instants)
+        count = crossings(limit, cubic, site, step_s, at_0, at_1, instants)
         inside = at_0[0] >= 0.0
         if inside:
             holding += 1

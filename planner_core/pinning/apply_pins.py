@@ -109,7 +109,7 @@ def _check_conflicts(
             )
         last[satellite] = kept
         if table.kind[kept.row] == COLLECT:
-            other = promised.setdefault(int(table.place[kept.row]), kept)
+            other = promised.setdefault(int(table.site[kept.row]), kept)
             if other is not kept:
                 raise _conflict(kept, f"{other.pointer} keeps another image of the same target")
     _check_antennas(problem, [kept for kept in ordered if table.kind[kept.row] == CONTACT])
@@ -129,16 +129,16 @@ def _check_antennas(problem: Problem, contacts: Sequence[Kept]) -> None:
     """Raise where a station is to serve more satellites than it has antennas for."""
     table = problem.opportunities
     rows = np.array([kept.row for kept in contacts], dtype=np.int64)
-    place, start_s, end_s = table.place[rows], table.start_s[rows], table.end_s[rows]
+    site, start_s, end_s = table.site[rows], table.start_s[rows], table.end_s[rows]
     for position, kept in enumerate(contacts):
         is_earlier = (
-            (place == place[position])
+            (site == site[position])
             & (start_s <= start_s[position])
             & (end_s > start_s[position] + TIME_TOLERANCE_S)
         )
         is_earlier[position] = False
         earlier = np.flatnonzero(is_earlier)
-        if len(earlier) >= problem.station_antennas[place[position]]:
+        if len(earlier) >= problem.station_antennas[site[position]]:
             why = f"the station then serves what {contacts[int(earlier[0])].pointer} keeps"
             raise _conflict(kept, why)
 
@@ -165,7 +165,7 @@ def _ruled_out(problem: Problem, pinned: Pinned, facts: Bools) -> Bools:
     is_done = imaged_before(problem)
     is_done[[kept.row for kept in pinned.kept]] = False
     is_out |= is_done
-    is_out |= (table.kind == COLLECT) & np.isin(table.place, sorted(pinned.forbidden))
+    is_out |= (table.kind == COLLECT) & np.isin(table.site, sorted(pinned.forbidden))
     for _, rows in _pins_that_rule_out(problem, pinned):
         is_out[rows] = True
     return is_out
@@ -186,7 +186,7 @@ def rows_in(problem: Problem, blocked: Blocked) -> Longs:
     whose = (
         table.satellite == blocked.satellite
         if blocked.station is None
-        else (table.kind == CONTACT) & (table.place == blocked.station)
+        else (table.kind == CONTACT) & (table.site == blocked.station)
     )
     return np.flatnonzero(
         whose
@@ -211,7 +211,7 @@ def _struck(
     """Return the collects that are ruled out."""
     table = problem.opportunities
     rows = np.flatnonzero(is_struck & (table.kind == COLLECT))
-    rows = rows[np.argsort(table.place[rows], kind="stable")]
+    rows = rows[np.argsort(table.site[rows], kind="stable")]
     # What is struck for a kept action stands in one row or more of ``beside``, here by that row.
     order = np.argsort(beside.row, kind="stable")
     first = beside.row[order].searchsorted(rows)
@@ -219,15 +219,15 @@ def _struck(
     first_kept = np.concatenate([[0], np.cumsum(count)])
     at = np.arange(first_kept[-1]) - np.repeat(first_kept[:-1] - first, count)
     kept = np.array([one.row for one in pinned.kept], dtype=np.int64)
-    place = np.cumsum(~is_struck) - 1
+    row_after = np.cumsum(~is_struck) - 1
     return StruckCollects(
-        target=table.place[rows],
+        target=table.site[rows],
         row=(rows if problem.origin is None else problem.origin[rows]).astype(np.int32),
         satellite=table.satellite[rows],
         start_s=table.start_s[rows],
         end_s=table.end_s[rows],
         why=why[rows],
-        kept=place[kept[beside.position[order[at]]]].astype(np.int32),
+        kept=row_after[kept[beside.position[order[at]]]].astype(np.int32),
         first_kept=first_kept,
     )
 

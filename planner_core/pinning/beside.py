@@ -57,7 +57,7 @@ def _images_of_the_same(problem: Problem, rows: Longs) -> tuple[Longs, Longs]:
     """Return pairs of a kept collect and an image of its target."""
     images, offsets = problem.target_opportunities
     own = np.flatnonzero(problem.opportunities.kind[rows] == COLLECT)
-    target = problem.opportunities.place[rows[own]]
+    target = problem.opportunities.site[rows[own]]
     count = offsets[target + 1] - offsets[target]
     first_of = np.cumsum(count) - count
     at = np.arange(count.sum()) - np.repeat(first_of - offsets[target], count)
@@ -69,9 +69,9 @@ def _without_antenna(problem: Problem, rows: Longs) -> list[tuple[Longs, Longs]]
     table = problem.opportunities
     is_contact = table.kind == CONTACT
     pairs = []
-    for station in np.unique(table.place[rows[is_contact[rows]]]):
-        others = np.flatnonzero(is_contact & (table.place == station))
-        own = np.flatnonzero(is_contact[rows] & (table.place[rows] == station))
+    for station in np.unique(table.site[rows[is_contact[rows]]]):
+        others = np.flatnonzero(is_contact & (table.site == station))
+        own = np.flatnonzero(is_contact[rows] & (table.site[rows] == station))
         for position in own:
             found = others[_finds_none(problem, rows[position], rows[own], others)]
             pairs.append((np.full(len(found), position), found))
@@ -86,6 +86,6 @@ def _finds_none(problem: Problem, row: int, kept: Longs, others: Longs) -> Bools
     is_running = (table.start_s[kept] <= from_s[:, None]) & (
         table.end_s[kept] > from_s[:, None] + TIME_TOLERANCE_S
     )
-    num_antennas = problem.station_antennas[table.place[row]]
+    num_antennas = problem.station_antennas[table.site[row]]
     is_crowded = is_running.sum(axis=1) >= num_antennas
     return np.asarray((to_s > from_s + TIME_TOLERANCE_S) & is_crowded)

@@ -148,7 +148,7 @@ def _add_beside(problem: Problem, action: Action, rows: list[int], starts: list[
         (action.start_s, action.end_s),
         line_of_sight(problem, row, action.start_s),
         line_of_sight(problem, row, action.end_s),
-        table.place[others],
+        table.site[others],
         length_s,
         np.maximum(table.access_start_s[others], 0.0),
         np.minimum(table.access_end_s[others], problem.horizon_s) - length_s,

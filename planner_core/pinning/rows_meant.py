@@ -35,8 +35,8 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
     satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
     stations = {station.id: i for i, station in enumerate(scenario.ground_stations)}
-    num_places = 1 + max(len(targets), len(stations))
-    keys = (table.satellite.astype(np.int64) * 2 + table.kind) * num_places + table.place
+    num_sites = 1 + max(len(targets), len(stations))
+    keys = (table.satellite.astype(np.int64) * 2 + table.kind) * num_sites + table.site
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
     wanted, offsets_s = {}, {}
@@ -45,12 +45,12 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
         assert action.start is not None
         if action.start < scenario.horizon.start:
             continue
-        kind, place = (
+        kind, site = (
             (COLLECT, targets[action.target_id])
             if action.target_id is not None
             else (CONTACT, stations[action.station_id or ""])
         )
-        wanted[i] = (satellites[action.satellite_id] * 2 + kind) * num_places + place
+        wanted[i] = (satellites[action.satellite_id] * 2 + kind) * num_sites + site
         offsets_s[i] = scenario.horizon.offset_s(action.start)
     asked = np.array(list(wanted.values()), dtype=np.int64)
     spans = zip(
@@ -118,10 +118,10 @@ def _named_by(named: Named, pin: PinnedAction) -> Bools:
         fits &= table.satellite == ids.index(pin.satellite_id)
     if pin.target_id is not None:
         ids = [target.id for target in scenario.targets]
-        fits &= (table.kind == COLLECT) & (table.place == ids.index(pin.target_id))
+        fits &= (table.kind == COLLECT) & (table.site == ids.index(pin.target_id))
     if pin.station_id is not None:
         ids = [station.id for station in scenario.ground_stations]
-        fits &= (table.kind == CONTACT) & (table.place == ids.index(pin.station_id))
+        fits &= (table.kind == CONTACT) & (table.site == ids.index(pin.station_id))
     if pin.opportunity_id is not None:
         numbers = np.arange(len(table)) if named.origin is None else named.origin
         fits &= numbers == _number_of(pin.opportunity_id)

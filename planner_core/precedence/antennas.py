@@ -45,7 +45,7 @@ def antenna_groups(problem: Problem) -> tuple[AntennaGroup, ...]:
 def _groups(problem: Problem) -> Iterator[AntennaGroup]:
     table = problem.opportunities
     for station, antennas in enumerate(problem.station_antennas.tolist()):
-        rows = np.flatnonzero((table.kind == CONTACT) & (table.place == station))
+        rows = np.flatnonzero((table.kind == CONTACT) & (table.site == station))
         for contacts in at_the_same_time(problem, rows):
             # A satellite has one contact at a time, whatever its station can serve.
             if len(np.unique(table.satellite[contacts])) > antennas:
@@ -71,18 +71,18 @@ def at_the_same_time(problem: Problem, rows: npt.NDArray[np.integer]) -> list[li
     return [sorted(one) for one in [*found, running] if one]
 
 
-def antenna_tolls(problem: Problem, prices: Floats | None) -> Floats:
-    """Return what each opportunity pays where a place in each group has a price. Shape ``(n,)``."""
+def antenna_tolls(problem: Problem, multipliers: Floats | None) -> Floats:
+    """Return what each opportunity pays at these multipliers of antennas. Shape ``(n,)``."""
     tolls = np.zeros(len(problem.opportunities))
-    if prices is not None:
-        for group, price in zip(antenna_groups(problem), prices.tolist(), strict=True):
-            tolls[group.rows] += max(price, 0.0)
+    if multipliers is not None:
+        for group, multiplier in zip(antenna_groups(problem), multipliers.tolist(), strict=True):
+            tolls[group.rows] += max(multiplier, 0.0)
     return tolls
 
 
-def paid_for_antennas(problem: Problem, prices: Floats | None) -> float:
-    """Return what all places at these prices come to, which no plan pays more than."""
-    if prices is None:
+def paid_for_antennas(problem: Problem, multipliers: Floats | None) -> float:
+    """Return what all places at these multipliers come to, which no plan pays more than."""
+    if multipliers is None:
         return 0.0
     limits = np.array([group.limit for group in antenna_groups(problem)], dtype=np.float64)
-    return float(limits @ np.maximum(prices, 0.0))
+    return float(limits @ np.maximum(multipliers, 0.0))

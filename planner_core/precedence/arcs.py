@@ -239,7 +239,7 @@ class ArcNetwork(NamedTuple):
     ----------
     row
         Row of each node in the table of opportunities. Shape ``(n,)``.
-    place
+    site
         Target of each node; of a contact, one past the last target. Shape ``(n,)``.
     first
         Where each part's nodes begin. A satellite's tasks fall into parts where a pause is
@@ -256,7 +256,7 @@ class ArcNetwork(NamedTuple):
     """
 
     row: Ints
-    place: Ints
+    site: Ints
     first: Longs
     arc_from: Longs
     before: Ints
@@ -294,7 +294,7 @@ def arc_network_of(problem: Problem) -> ArcNetwork:
     is_collect = table.kind[rows] == COLLECT
     return ArcNetwork(
         row=rows,
-        place=np.where(is_collect, table.place[rows], len(problem.target_ids)).astype(np.int32),
+        site=np.where(is_collect, table.site[rows], len(problem.target_ids)).astype(np.int32),
         first=np.concatenate(first),
         arc_from=np.concatenate(arc_from),
         before=np.concatenate(before),

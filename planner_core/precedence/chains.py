@@ -20,22 +20,22 @@ def heaviest_chain(satellite: SatelliteProblem, weight: Floats) -> list[int]:
     return chain_with_history(satellite, weight, np.full(len(weight), -1, dtype=np.int32))
 
 
-def chain_with_history(satellite: SatelliteProblem, weight: Floats, place: Ints) -> list[int]:
+def chain_with_history(satellite: SatelliteProblem, weight: Floats, site: Ints) -> list[int]:
     """Return the tasks of a heavy chain in which no place stands twice.
 
     Parameters
     ----------
-    weight, place
+    weight, site
         Worth of each task, not negative; where it happens, or -1 where it may happen again.
         Shape ``(m,)``.
     """
     before = np.full(len(weight), -1, dtype=np.int32)
     direct = direct_precedence(satellite)
     if is_transitive_on(satellite):
-        _, task = longest_path_with_history(weight, place, covering_arcs(direct), before)
+        _, task = longest_path_with_history(weight, site, covering_arcs(direct), before)
     else:
         by_far = np.argsort(direct.far_from, kind="stable")
-        _, task = longest_chain_with_history(weight, place, direct, by_far, before)
+        _, task = longest_chain_with_history(weight, site, direct, by_far, before)
     return _chain_to(task, before)
 
 
@@ -49,31 +49,31 @@ def _chain_to(task: int, before: Ints) -> list[int]:
 
 
 @inner
-def _no_history(weight: Floats, place: Ints) -> Words:
+def _no_history(weight: Floats, site: Ints) -> Words:
     """Return an empty set of places for each task."""
     num_words = 0
     for a in range(len(weight)):
         if weight[a] > 0.0:
-            num_words = max(num_words, (place[a] >> 6) + 1)
+            num_words = max(num_words, (site[a] >> 6) + 1)
     return np.zeros((len(weight), num_words), dtype=np.uint64)
 
 
 @borrowing_inner
-def _holds(history: Words, task: int, place: int) -> bool:
-    if place < 0:
+def _holds(history: Words, task: int, site: int) -> bool:
+    if site < 0:
         return False
-    return bool(history[task, place >> 6] & (np.uint64(1) << np.uint64(place & 63)))
+    return bool(history[task, site >> 6] & (np.uint64(1) << np.uint64(site & 63)))
 
 
 @borrowing_inner
-def _note(history: Words, task: int, place: int) -> None:
-    if place >= 0:
-        history[task, place >> 6] |= np.uint64(1) << np.uint64(place & 63)
+def _note(history: Words, task: int, site: int) -> None:
+    if site >= 0:
+        history[task, site >> 6] |= np.uint64(1) << np.uint64(site & 63)
 
 
 @kernel
 def longest_path_with_history(
-    weight: Floats, place: Ints, arcs: Arcs, before: Ints
+    weight: Floats, site: Ints, arcs: Arcs, before: Ints
 ) -> tuple[float, int]:
     """Return the weight and end of a heavy chain in which no place stands twice.
 
@@ -83,13 +83,13 @@ def longest_path_with_history(
 
     Parameters
     ----------
-    weight, place
+    weight, site
         Worth of each task, not negative; where it happens, or -1. Shape ``(m,)``.
     before
         Filled with the task before each on its chain, or -1. Shape ``(m,)``.
     """
     m = len(weight)
-    history = _no_history(weight, place)
+    history = _no_history(weight, site)
     value = np.zeros(m)
     passed = np.full(m, -1, dtype=np.int32)  # where the heaviest chain comes from
     fitting = np.full(m, -1, dtype=np.int32)  # and the heaviest without this task's place
@@ -105,7 +105,7 @@ def longest_path_with_history(
                 before[a] = last[source]
             else:
                 before[a] = -1
-            _note(history, a, place[a])
+            _note(history, a, site[a])
             value[a] = total + weight[a]
             last[a] = a
             if value[a] > best:
@@ -120,14 +120,14 @@ def longest_path_with_history(
                 passed[b] = a
             if fitting[b] >= 0 and value[a] <= value[fitting[b]]:
                 continue
-            if weight[b] > 0.0 and not _holds(history, a, place[b]):
+            if weight[b] > 0.0 and not _holds(history, a, site[b]):
                 fitting[b] = a
     return best, best_task
 
 
 @kernel
 def longest_chain_with_history(
-    weight: Floats, place: Ints, precedence: Precedence, by_far: Longs, before: Ints
+    weight: Floats, site: Ints, precedence: Precedence, by_far: Longs, before: Ints
 ) -> tuple[float, int]:
     """Return what ``longest_path_with_history`` does, on the table of all pairs.
 
@@ -135,7 +135,7 @@ def longest_chain_with_history(
     """
     near_from, far_from, offset, bits = precedence
     m = len(weight)
-    history = _no_history(weight, place)
+    history = _no_history(weight, site)
     reached = np.zeros(m)
     # Tasks by falling weight of their chains, among those that everything from here may follow.
     far = np.empty(m, dtype=np.int32)
@@ -160,13 +160,13 @@ def longest_chain_with_history(
         for at in range(num_far):
             if reached[far[at]] <= reached[b]:
                 break
-            if not _holds(history, far[at], place[b]):
+            if not _holds(history, far[at], site[b]):
                 reached[b] = reached[far[at]]
                 before[b] = far[at]
                 break
         if before[b] >= 0:
             history[b] = history[before[b]]
-        _note(history, b, place[b])
+        _note(history, b, site[b])
         reached[b] += weight[b]
         if reached[b] > best:
             best, best_task = reached[b], b
@@ -174,7 +174,7 @@ def longest_chain_with_history(
             near = offset[b] + c - near_from[b]
             if not (bits[near >> 3] >> (near & 7)) & 1 or reached[b] <= reached[c]:
                 continue
-            if not _holds(history, b, place[c]):
+            if not _holds(history, b, site[c]):
                 reached[c] = reached[b]
                 before[c] = b
     return best, best_task

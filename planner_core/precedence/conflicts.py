@@ -22,8 +22,8 @@ def conflicts(problem: Problem, row: int, taken: Collection[int] | Ints) -> list
     fits = fit_beside(problem.satellites[satellite], np.full_like(beside, local[row]), beside)
     found: list[int] = own[~fits].tolist()
     if table.kind[row] == CONTACT:
-        station = table.place[row]
-        there = others[(table.kind[others] == CONTACT) & (table.place[others] == station)]
+        station = table.site[row]
+        there = others[(table.kind[others] == CONTACT) & (table.site[others] == station)]
         at_once = (table.start_s[there] < table.end_s[row] - TIME_TOLERANCE_S) & (
             table.end_s[there] > table.start_s[row] + TIME_TOLERANCE_S
         )

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from planner_core.bundles import bundle
 from planner_core.jit import borrowing, borrowing_inner, kernel
-from planner_core.precedence.time_windows import Spans, View
+from planner_core.precedence.time_windows import TimeWindows, View
 from planner_core.problem import (
     Bytes,
     Floats,
@@ -34,7 +34,7 @@ milliseconds and tolerance included."""
 
 
 @bundle
-class Arrivals(NamedTuple):
+class EarliestStarts(NamedTuple):
     """Cells, and what may follow from each.
 
     Attributes
@@ -61,13 +61,15 @@ class Arrivals(NamedTuple):
     slope: Singles
 
 
-def num_cells(spans: Spans, width_s: float) -> Ints:
+def num_cells(spans: TimeWindows, width_s: float) -> Ints:
     """Return into how many cells each task's starts fall. Shape ``(n,)``."""
     count = np.ceil((spans.close_s - spans.open_s) / width_s - 1e-9)
     return np.maximum(count, 1.0).astype(np.int32)
 
 
-def arrivals_of(spans: Spans, view: View, width_s: float, stop: Bytes | None = None) -> Arrivals:
+def earliest_starts_of(
+    spans: TimeWindows, view: View, width_s: float, stop: Bytes | None = None
+) -> EarliestStarts:
     """Return the table of one satellite's tasks.
 
     When ``stop[0]`` becomes non-zero it ends early, and lacks what would come.
@@ -75,37 +77,37 @@ def arrivals_of(spans: Spans, view: View, width_s: float, stop: Bytes | None = N
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
     first_cell = np.concatenate([[0], np.cumsum(num_cells(spans, width_s))]).astype(np.int32)
     first_arc, to, after_s, slope = _tabulate(spans, view, width_s, first_cell, stop)
-    return Arrivals(width_s, first_cell, first_arc, to, after_s, slope)
+    return EarliestStarts(width_s, first_cell, first_arc, to, after_s, slope)
 
 
 @borrowing_inner
-def cell_of(arrivals: Arrivals, spans: Spans, task: int, start_s: float) -> int:
+def cell_of(earliest: EarliestStarts, spans: TimeWindows, task: int, start_s: float) -> int:
     """Return the cell that a start of a task falls into."""
-    k = int((start_s - spans.open_s[task]) / arrivals.width_s)
-    first, end = arrivals.first_cell[task], arrivals.first_cell[task + 1]
+    k = int((start_s - spans.open_s[task]) / earliest.width_s)
+    first, end = earliest.first_cell[task], earliest.first_cell[task + 1]
     return int(min(max(first + k, first), end - 1))
 
 
 @borrowing_inner
-def edge_s(arrivals: Arrivals, spans: Spans, task: int, cell: int) -> float:
+def edge_s(earliest: EarliestStarts, spans: TimeWindows, task: int, cell: int) -> float:
     """Return the left edge of a task's cell."""
-    return float(spans.open_s[task] + (cell - arrivals.first_cell[task]) * arrivals.width_s)
+    return float(spans.open_s[task] + (cell - earliest.first_cell[task]) * earliest.width_s)
 
 
 @borrowing
-def follows_at_s(spans: Spans, view: View, a: int, start_s: float, b: int) -> float:
+def follows_at_s(spans: TimeWindows, view: View, a: int, start_s: float, b: int) -> float:
     """Return the earliest start of ``b`` after ``a`` at ``start_s``; infinite where none is."""
     end_s = start_s + spans.length_s[a]
-    looked = sight(view.path, view.places_m, spans.place[a], end_s)
+    looked = sight(view.path, view.sites_m, spans.site[a], end_s)
     return earliest_start_s(
-        view.agile, end_s, looked, view.path, view.places_m,
-        spans.place[b], spans.open_s[b], spans.close_s[b],
+        view.agile, end_s, looked, view.path, view.sites_m,
+        spans.site[b], spans.open_s[b], spans.close_s[b],
     )  # fmt: skip
 
 
 @kernel
 def _tabulate(
-    spans: Spans, view: View, width_s: float, first_cell: Ints, stop: Bytes
+    spans: TimeWindows, view: View, width_s: float, first_cell: Ints, stop: Bytes
 ) -> tuple[Longs, Ints, Singles, Singles]:
     n = len(spans.open_s)
     agile = view.agile
@@ -116,7 +118,7 @@ def _tabulate(
         least_s = min(least_s, spans.length_s[i])
     opens = np.empty((n, 3))
     for i in range(n):
-        opens[i] = sight(view.path, view.places_m, spans.place[i], spans.open_s[i])
+        opens[i] = sight(view.path, view.sites_m, spans.site[i], spans.open_s[i])
     first_arc = np.zeros(first_cell[n] + 1, dtype=np.int64)
     room = 32 * max(1, first_cell[n])
     to = np.empty(room, dtype=np.int32)
@@ -177,7 +179,7 @@ def _tabulate(
                     if right[b] < np.inf:
                         end_s = right[b] + spans.length_s[b]
                         own[num_own], own_end_s[num_own] = b, end_s
-                        own_looked[num_own] = sight(view.path, view.places_m, spans.place[b], end_s)
+                        own_looked[num_own] = sight(view.path, view.sites_m, spans.site[b], end_s)
                         num_own += 1
                         far_s = min(far_s, end_s + turn_s)
                 b += 1
@@ -188,7 +190,7 @@ def _tabulate(
 
 @borrowing_inner
 def _is_covered(
-    spans: Spans,
+    spans: TimeWindows,
     view: View,
     end_s: Floats,
     looked: Floats,

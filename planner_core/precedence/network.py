@@ -45,7 +45,7 @@ class Network(NamedTuple):
     ----------
     row
         Row of each node in the table of opportunities. Shape ``(n,)``.
-    place
+    site
         Target of each node; of a contact, one past the last target. Shape ``(n,)``.
     first
         Where each part's nodes begin. Shape ``(num_parts + 1,)``.
@@ -66,7 +66,7 @@ class Network(NamedTuple):
     """
 
     row: Ints
-    place: Ints
+    site: Ints
     first: Longs
     start_s: Floats
     end_s: Floats
@@ -89,10 +89,10 @@ def network_of(problem: Problem, satellites: Sequence[SatelliteProblem] | None =
     by_end = [np.lexsort((t.start_s, t.end_s)) for t in tasks]
     rows = _joined([satellite.rows for satellite in satellites], np.int32)
     is_collect = problem.opportunities.kind[rows] == COLLECT
-    place = np.where(is_collect, problem.opportunities.place[rows], len(problem.target_ids))
+    site = np.where(is_collect, problem.opportunities.site[rows], len(problem.target_ids))
     return Network(
         row=rows,
-        place=place.astype(np.int32),
+        site=site.astype(np.int32),
         first=_joined([0, *(b + e for b, e in zip(bases, ends, strict=True))], np.int64),
         start_s=_joined([t.start_s for t in tasks], np.float64),
         end_s=_joined([t.end_s for t in tasks], np.float64),

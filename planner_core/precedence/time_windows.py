@@ -25,14 +25,14 @@ _LEAST_S = 5e-4  # half a millisecond
 
 
 @bundle
-class Spans(NamedTuple):
+class TimeWindows(NamedTuple):
     """Tasks in order of their first start; shape ``(n,)`` each.
 
     Attributes
     ----------
     row
         An opportunity of the access.
-    place
+    site
         Row of ``places_m``: the target, or a station after all targets.
     open_s, close_s
         The first and the last start.
@@ -41,7 +41,7 @@ class Spans(NamedTuple):
     """
 
     row: Ints
-    place: Ints
+    site: Ints
     open_s: Floats
     close_s: Floats
     length_s: Floats
@@ -59,7 +59,7 @@ class View(NamedTuple):
     """
 
     path: Path
-    places_m: Floats
+    sites_m: Floats
     agile: Agile
 
 
@@ -70,11 +70,11 @@ def view_of(problem: Problem, index: int) -> View:
         raise ValueError("The problem has no continuous starts.")
     agility = problem.satellites[index].agility
     agile = agile_of(agility.slew_rate_deg_s, agility.acceleration_deg_s2, agility.settle_s)
-    places_m = np.concatenate([pointing.targets_m, pointing.stations_m])
-    return View(pointing.paths[index], places_m, agile)
+    sites_m = np.concatenate([pointing.targets_m, pointing.stations_m])
+    return View(pointing.paths[index], sites_m, agile)
 
 
-def spans_of(problem: Problem, index: int) -> Spans:
+def spans_of(problem: Problem, index: int) -> TimeWindows:
     """Return the collects of one satellite: its accesses, or what pins leave of them."""
     table, pinned = problem.opportunities, problem.pinned
     rows = problem.satellites[index].rows
@@ -102,9 +102,9 @@ def spans_of(problem: Problem, index: int) -> Spans:
         open_s, close_s = open_s[is_left], close_s[is_left]
     close_s = np.maximum(np.round(close_s, 3), open_s)
     order = np.lexsort((rows, close_s, open_s))
-    return Spans(
+    return TimeWindows(
         row=rows[order],
-        place=table.place[rows[order]],
+        site=table.site[rows[order]],
         open_s=open_s[order],
         close_s=close_s[order],
         length_s=length_s[order],
@@ -112,11 +112,11 @@ def spans_of(problem: Problem, index: int) -> Spans:
     )
 
 
-def part_of(spans: Spans, rows: npt.NDArray[np.integer] | slice) -> Spans:
+def part_of(spans: TimeWindows, rows: npt.NDArray[np.integer] | slice) -> TimeWindows:
     """Return some of the tasks."""
-    return Spans(
+    return TimeWindows(
         row=spans.row[rows],
-        place=spans.place[rows],
+        site=spans.site[rows],
         open_s=spans.open_s[rows],
         close_s=spans.close_s[rows],
         length_s=spans.length_s[rows],
@@ -124,13 +124,13 @@ def part_of(spans: Spans, rows: npt.NDArray[np.integer] | slice) -> Spans:
     )
 
 
-def with_contacts(problem: Problem, spans: Spans, rows: Ints) -> Spans:
+def with_contacts(problem: Problem, spans: TimeWindows, rows: Ints) -> TimeWindows:
     """Return tasks with contacts among them, which have their own start alone."""
     table = problem.opportunities
-    joined = Spans(
+    joined = TimeWindows(
         row=np.concatenate([spans.row, rows]).astype(np.int32),
-        place=np.concatenate(
-            [spans.place, table.place[rows] + np.int32(len(problem.target_ids))]
+        site=np.concatenate(
+            [spans.site, table.site[rows] + np.int32(len(problem.target_ids))]
         ).astype(np.int32),
         open_s=np.concatenate([spans.open_s, table.start_s[rows]]),
         close_s=np.concatenate([spans.close_s, table.start_s[rows]]),
@@ -146,7 +146,7 @@ def action_of(problem: Problem, row: int, start_s: float) -> Action:
     table = problem.opportunities
     if table.kind[row] != COLLECT:
         return Action(float(table.start_s[row]), float(table.end_s[row]), row)
-    rows = problem.collects_of(int(table.place[row]))
+    rows = problem.collects_of(int(table.site[row]))
     rows = rows[table.access[rows] == table.access[row]]
     nearest = int(rows[np.argmin(np.abs(table.start_s[rows] - start_s))])
     if abs(table.start_s[nearest] - start_s) < _LEAST_S:

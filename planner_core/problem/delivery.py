@@ -78,7 +78,7 @@ def _first_down_s(
     if fastest_per_s <= 0.0:
         return np.full(len(end_s), np.inf)
     starts_s = satellite.start_s[contacts]
-    ready_s = starts_s + links.stations.setup_s[satellite.place[contacts]]
+    ready_s = starts_s + links.stations.setup_s[satellite.site[contacts]]
     # Of the contacts from each on, the first that is set up.
     ready_s = np.append(np.minimum.accumulate(ready_s[::-1])[::-1], np.inf)
     following = np.searchsorted(starts_s, end_s - TIME_TOLERANCE_S)
@@ -94,7 +94,7 @@ def fastest_downlink_per_s(problem: Problem, satellite: SatelliteProblem, contac
         problem.opportunities.access[satellite.rows[contacts]], return_index=True
     )
     fastest_per_s = (
-        satellite.resources.downlink_per_s * links.stations.gain[satellite.place[contacts[first]]]
+        satellite.resources.downlink_per_s * links.stations.gain[satellite.site[contacts[first]]]
     )
     which = links.which(access)
     is_known = which >= 0

@@ -38,7 +38,7 @@ def imaged_before(problem: Problem) -> Bools:
     """Return the collects of targets that have an image from before. Shape ``(n,)``."""
     table = problem.opportunities
     targets = [image.target for image in problem.on_board]
-    return np.asarray((table.kind == COLLECT) & np.isin(table.place, targets))
+    return np.asarray((table.kind == COLLECT) & np.isin(table.site, targets))
 
 
 def without_on_board(problem: Problem) -> Problem:
@@ -73,7 +73,7 @@ def _earliest_down_s(problem: Problem, satellite: SatelliteProblem, queued: Floa
     contacts = np.flatnonzero(satellite.kind == CONTACT)
     if len(contacts) == 0:
         return np.full(len(queued), np.inf)
-    setup_s = problem.downlinks.stations.setup_s[satellite.place[contacts]]
+    setup_s = problem.downlinks.stations.setup_s[satellite.site[contacts]]
     access = problem.opportunities.access[satellite.rows[contacts]]
     _, passes = np.unique(access, return_inverse=True)
     ready_s = np.full(passes.max() + 1, np.inf)

@@ -42,12 +42,12 @@ class Blocked:
         """Whether it is a fact that was reported, and not an operator's wish."""
         return self.pointer.startswith("/outages/")
 
-    def concerns(self, satellite: int, kind: int, place: int) -> bool:
+    def concerns(self, satellite: int, kind: int, site: int) -> bool:
         """Return whether such a task may not overlap the span."""
         if kind not in self.kinds:
             return False
         if self.station is not None:
-            return kind == CONTACT and place == self.station
+            return kind == CONTACT and site == self.station
         return satellite == self.satellite
 
 

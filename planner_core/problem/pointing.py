@@ -90,10 +90,10 @@ def position_m(path: Path, t_s: float) -> Vector:
 
 
 @borrowing
-def sight(path: Path, places: Floats, place: int, t_s: float) -> Vector:
+def sight(path: Path, sites: Floats, site: int, t_s: float) -> Vector:
     """Return the unit vector from the satellite to ``places[place]``, inertial (TEME)."""
     x, y, z = position_m(path, t_s)
-    x, y, z = places[place, 0] - x, places[place, 1] - y, places[place, 2] - z
+    x, y, z = sites[site, 0] - x, sites[site, 1] - y, sites[site, 2] - z
     range_m = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / range_m, y / range_m, z / range_m
     k = min(max(int(t_s / path.step_s), 0), len(path.nodes) - 2)
@@ -120,8 +120,8 @@ def earliest_start_s(
     end_s: float,
     looked: Vector,
     path: Path,
-    places: Floats,
-    place: int,
+    sites: Floats,
+    site: int,
     open_s: float,
     close_s: float,
 ) -> float:
@@ -135,20 +135,20 @@ def earliest_start_s(
     ----------
     end_s, looked
         The end of the task before, and its line of sight then.
-    place
-        Row of ``places`` that the start looks at.
+    site
+        Row of ``sites`` that the start looks at.
     """
     low = math.ceil(max(open_s, end_s + agile.settle_s) * 1000.0 - 1e-4) / 1000.0
     if low > close_s + 1e-9:
         return np.inf
-    missing = end_s + needed_s(agile, looked, sight(path, places, place, low)) - low
+    missing = end_s + needed_s(agile, looked, sight(path, sites, site, low)) - low
     if missing <= TIME_TOLERANCE_S / 2.0:
         return low
     # Secants, each a little too long, until there is time enough; then between the two.
     high, left = low + 1.02 * missing, -1.0
     for _ in range(60):
         high = min(high, close_s)
-        left = high - end_s - needed_s(agile, looked, sight(path, places, place, high))
+        left = high - end_s - needed_s(agile, looked, sight(path, sites, site, high))
         if left >= 0.0:
             break
         if high >= close_s:
@@ -161,7 +161,7 @@ def earliest_start_s(
             break
         share = missing / (missing + left)
         middle = low + min(max(share, 0.05), 0.95) * (high - low)
-        over = middle - end_s - needed_s(agile, looked, sight(path, places, place, middle))
+        over = middle - end_s - needed_s(agile, looked, sight(path, sites, site, middle))
         if over >= 0.0:
             high, left = middle, over
         else:
@@ -170,7 +170,7 @@ def earliest_start_s(
     for _ in range(3):
         if start > close_s + 1e-9:
             return np.inf
-        over = start - end_s - needed_s(agile, looked, sight(path, places, place, start))
+        over = start - end_s - needed_s(agile, looked, sight(path, sites, site, start))
         if over >= -TIME_TOLERANCE_S / 2.0:
             return start
         start = math.ceil(start * 1000.0 + 0.5) / 1000.0
@@ -183,8 +183,8 @@ def latest_start_s(
     start_s: float,
     looks: Vector,
     path: Path,
-    places: Floats,
-    place: int,
+    sites: Floats,
+    site: int,
     length_s: float,
     open_s: float,
     close_s: float,
@@ -203,7 +203,7 @@ def latest_start_s(
     high = math.floor(min(close_s, start_s - agile.settle_s - length_s) * 1000.0 + 1e-4) / 1000.0
     if high < open_s - 1e-9:
         return -np.inf
-    late = needed_s(agile, sight(path, places, place, high + length_s), looks)
+    late = needed_s(agile, sight(path, sites, site, high + length_s), looks)
     missing = late + high + length_s - start_s
     if missing <= TIME_TOLERANCE_S / 2.0:
         return high
@@ -211,7 +211,7 @@ def latest_start_s(
     for _ in range(60):
         low = max(low, open_s)
         left = start_s - low - length_s
-        left -= needed_s(agile, sight(path, places, place, low + length_s), looks)
+        left -= needed_s(agile, sight(path, sites, site, low + length_s), looks)
         if left >= 0.0:
             break
         if low <= open_s:
@@ -225,7 +225,7 @@ def latest_start_s(
         share = missing / (missing + left)
         middle = high - min(max(share, 0.05), 0.95) * (high - low)
         over = start_s - middle - length_s
-        over -= needed_s(agile, sight(path, places, place, middle + length_s), looks)
+        over -= needed_s(agile, sight(path, sites, site, middle + length_s), looks)
         if over >= 0.0:
             low, left = middle, over
         else:
@@ -235,7 +235,7 @@ def latest_start_s(
         if start < open_s - 1e-9:
             return -np.inf
         over = start_s - start - length_s
-        over -= needed_s(agile, sight(path, places, place, start + length_s), looks)
+        over -= needed_s(agile, sight(path, sites, site, start + length_s), looks)
         if over >= -TIME_TOLERANCE_S / 2.0:
             return start
         start = math.floor(start * 1000.0 - 0.5) / 1000.0
@@ -248,9 +248,9 @@ def agile_of(rate_deg_s: float, acceleration_deg_s2: float | None, settle_s: flo
 
 
 @kernel
-def sights(path: Path, places: Floats, place: Ints, t_s: Floats) -> Floats:
+def sights(path: Path, sites: Floats, site: Ints, t_s: Floats) -> Floats:
     """Return the lines of sight to many places, each at its instant. Shape ``(n, 3)``."""
     found = np.empty((len(t_s), 3))
     for i in range(len(t_s)):
-        found[i, 0], found[i, 1], found[i, 2] = sight(path, places, place[i], t_s[i])
+        found[i, 0], found[i, 1], found[i, 2] = sight(path, sites, site[i], t_s[i])
     return found

@@ -45,7 +45,7 @@ class Opportunities:
         Index of the satellite in the scenario.
     kind
         ``COLLECT`` or ``CONTACT``.
-    place
+    site
         Index of the target (collect) or of the ground station (contact).
     access
         Number of the access it lies in, unique in the scenario.
@@ -66,7 +66,7 @@ class Opportunities:
 
     satellite: Ints
     kind: npt.NDArray[np.int8]
-    place: Ints
+    site: Ints
     access: Ints
     start_s: Floats
     end_s: Floats
@@ -200,7 +200,7 @@ class SatelliteProblem:
     resources: Resources
     rows: Ints
     kind: npt.NDArray[np.int8]
-    place: Ints
+    site: Ints
     start_s: Floats
     end_s: Floats
     transitions: Transitions
@@ -303,7 +303,7 @@ class Problem:
     def best_worth(self) -> Floats:
         """Return the most that an image of each target earns. Shape ``(num_targets,)``."""
         rows, _ = self.target_opportunities
-        target = self.opportunities.place[rows]
+        target = self.opportunities.site[rows]
         return best_worths(target, self.worth[rows], len(self.target_ids))
 
     @cached_property
@@ -317,7 +317,7 @@ class Problem:
     def has_better_images(self) -> bool:
         """Return whether of some target one image earns more than another that earns anything."""
         is_worth = (self.opportunities.kind == COLLECT) & (self.worth > 0.0)
-        best = self.best_worth[self.opportunities.place[is_worth]]
+        best = self.best_worth[self.opportunities.site[is_worth]]
         return bool(np.any(self.worth[is_worth] < best))
 
     @cached_property
@@ -346,7 +346,7 @@ class Problem:
         It earns that where all that it takes is on the ground as early as it can be.
         """
         images = rows[self.opportunities.kind[rows] == COLLECT]
-        return worth_of(self.opportunities.place[images], self.worth[images])
+        return worth_of(self.opportunities.site[images], self.worth[images])
 
     @property
     def turns_in_motion(self) -> bool:
@@ -369,8 +369,8 @@ class Problem:
     def target_opportunities(self) -> tuple[Ints, Longs]:
         """Return collects grouped by target: rows, and offsets of shape ``(num_targets + 1,)``."""
         collects = np.flatnonzero(self.opportunities.kind == COLLECT).astype(np.int32)
-        order = np.argsort(self.opportunities.place[collects], kind="stable")
-        counts = np.bincount(self.opportunities.place[collects], minlength=len(self.target_ids))
+        order = np.argsort(self.opportunities.site[collects], kind="stable")
+        counts = np.bincount(self.opportunities.site[collects], minlength=len(self.target_ids))
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         return collects[order], offsets
 
@@ -391,6 +391,6 @@ def line_of_sight(problem: Problem, row: int, t_s: float) -> Vector:
         x, y, z = own[row].tolist()
         return x, y, z
     is_collect = table.kind[row] == COLLECT
-    places = pointing.targets_m if is_collect else pointing.stations_m
+    sites = pointing.targets_m if is_collect else pointing.stations_m
     path = pointing.paths[int(table.satellite[row])]
-    return sight(path, places, int(table.place[row]), float(t_s))
+    return sight(path, sites, int(table.site[row]), float(t_s))

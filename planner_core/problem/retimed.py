@@ -104,18 +104,18 @@ def offered(made: Retimed, problem: Problem, plan: Plan) -> Plan:
 
 
 def _rank(problem: Problem, rows: Ints) -> Ints:
-    """Return the order of the rows' places by their ids as text, as the table has it."""
+    """Return the order of the rows' sites by their ids as text, as the table has it."""
     table = problem.opportunities
     ranks = []
     for ids in (problem.target_ids, problem.station_ids):
         rank = np.zeros(max(len(ids), 1), dtype=np.int32)
         rank[sorted(range(len(ids)), key=ids.__getitem__)] = np.arange(len(ids), dtype=np.int32)
         ranks.append(rank)
-    is_collect, place = table.kind[rows] == COLLECT, table.place[rows]
+    is_collect, site = table.kind[rows] == COLLECT, table.site[rows]
     return np.where(
         is_collect,
-        ranks[0][np.where(is_collect, place, 0)],
-        ranks[1][np.where(is_collect, 0, place)],
+        ranks[0][np.where(is_collect, site, 0)],
+        ranks[1][np.where(is_collect, 0, site)],
     )
 
 
@@ -130,7 +130,7 @@ def _lines_of_sight(
         own = np.flatnonzero(
             is_own & (table.satellite[rows] == index) & (table.kind[rows] == COLLECT)
         )
-        place = table.place[rows[own]]
-        looks[own] = sights(path, pointing.targets_m, place, start_s[own])
-        looked[own] = sights(path, pointing.targets_m, place, end_s[own])
+        site = table.site[rows[own]]
+        looks[own] = sights(path, pointing.targets_m, site, start_s[own])
+        looked[own] = sights(path, pointing.targets_m, site, end_s[own])
     return looks, looked

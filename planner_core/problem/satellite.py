@@ -42,7 +42,7 @@ def build_satellite_problem(
     volume[is_contact] = downlinks.volumes(
         resources.downlink_per_s,
         opportunities.access[contacts],
-        opportunities.place[contacts],
+        opportunities.site[contacts],
         start_s[is_contact],
         end_s[is_contact],
     )
@@ -53,7 +53,7 @@ def build_satellite_problem(
         resources=resources,
         rows=rows,
         kind=opportunities.kind[rows],
-        place=opportunities.place[rows],
+        site=opportunities.site[rows],
         start_s=start_s,
         end_s=end_s,
         transitions=transitions,

@@ -80,7 +80,7 @@ def _fitting(problem: Problem, plan: Plan, index: int, targets: Longs) -> tuple[
         np.array([a.start_s for a in tasks], dtype=np.float64),
         np.array([a.end_s for a in tasks], dtype=np.float64),
         np.array(looked, dtype=np.float64).reshape(len(tasks), 3),
-        table.place[rows],
+        table.site[rows],
         np.maximum(table.access_start_s[rows], 0.0),
         np.minimum(table.access_end_s[rows], problem.horizon_s) - length_s,
     )

@@ -141,7 +141,7 @@ def _settled_reasons(problem: Problem, plan: Plan, timeline: Timeline) -> dict[i
     }  # fmt: skip
     for position, code in blamed.items():
         row = plan.actions[position].opportunity
-        target = int(problem.opportunities.place[row])
+        target = int(problem.opportunities.site[row])
         if problem.opportunities.kind[row] == COLLECT and target not in timeline.collected:
             reasons[target] = _broken(position, row, code)
     return reasons
@@ -192,7 +192,7 @@ def earned_by(problem: Problem, plan: Plan, timeline: Timeline) -> Floats:
     images: dict[int, list[int]] = {}
     for position, action in enumerate(plan.actions):
         if table.kind[action.opportunity] == COLLECT:
-            images.setdefault(int(table.place[action.opportunity]), []).append(position)
+            images.setdefault(int(table.site[action.opportunity]), []).append(position)
     for target, collected in timeline.collected.items():
         # Another image of it would count instead.
         others = [p for p in images[target] if p != collected.position]

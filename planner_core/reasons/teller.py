@@ -98,7 +98,7 @@ class Teller:
             last=last,
             battery=float(plan.battery[k]),
             recorder=float(plan.recorder[k]),
-            collected=frozenset(self.planned.track.place[images].tolist()),
+            collected=frozenset(self.planned.track.site[images].tolist()),
         )
         return int(self.problem.local_row[opportunity]) in model.actions(state, breadth)
 

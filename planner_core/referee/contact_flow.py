@@ -23,7 +23,7 @@ def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> Float
     that at its middle.
     """
     table, links = problem.opportunities, problem.downlinks
-    station = int(table.place[action.opportunity])
+    station = int(table.site[action.opportunity])
     begins_s = action.start_s + float(links.stations.setup_s[station])
     if begins_s >= action.end_s:
         return np.empty((0, 3))
@@ -41,7 +41,7 @@ def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> Float
 def flows(problem: Problem, satellite: SatelliteProblem, contacts: Columns) -> Floats:
     """Return the same of many contacts, one after another. Shape ``(k, 3)``."""
     table, links = problem.opportunities, problem.downlinks
-    station = table.place[contacts.row]
+    station = table.site[contacts.row]
     return _flows(
         contacts.start_s + links.stations.setup_s[station],
         contacts.end_s,

@@ -35,11 +35,11 @@ def breaches(problem: Problem, plan: Plan) -> list[Violation]:
     for position, action in enumerate(plan.actions):
         row = action.opportunity
         satellite, kind = int(table.satellite[row]), int(table.kind[row])
-        place = int(table.place[row])
+        site = int(table.site[row])
         spans = [
             blocked
             for blocked in pinned.blocked
-            if blocked.concerns(satellite, kind, place)
+            if blocked.concerns(satellite, kind, site)
             and action.start_s < blocked.end_s - TIME_TOLERANCE_S
             and action.end_s > blocked.start_s + TIME_TOLERANCE_S
         ]
@@ -48,7 +48,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Violation]:
             for blocked in spans
             if not blocked.is_outage
         ]
-        if kind == COLLECT and place in pinned.forbidden:
+        if kind == COLLECT and site in pinned.forbidden:
             why.append("Its target is forbidden.")
         if row in pinned.skipped:
             why.append(f"It is what {pinned.skipped[row]} skips.")

@@ -23,7 +23,7 @@ class PlannedAction:
     end: datetime
     satellite_id: str
     mode: Mode
-    place_id: str
+    site_id: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class PlanView:
             for action in line.actions:
                 if action.opportunity is None:
                     continue
-                place = int(problem.opportunities.place[action.opportunity])
+                site = int(problem.opportunities.site[action.opportunity])
                 is_collect = problem.opportunities.kind[action.opportunity] == COLLECT
                 actions.append(
                     PlannedAction(
@@ -49,7 +49,7 @@ class PlanView:
                         end=scenario.horizon.instant(action.end_s),
                         satellite_id=satellite.id,
                         mode=action.mode,
-                        place_id=(problem.target_ids if is_collect else problem.station_ids)[place],
+                        site_id=(problem.target_ids if is_collect else problem.station_ids)[site],
                     )
                 )
         modes = [action.mode for action in actions]
@@ -97,8 +97,8 @@ class PlanDiff:
 def plan_diff(first: PlanView, second: PlanView) -> PlanDiff:
     """Return the difference of two plans; that of a plan and itself is empty."""
     before, after = _without_common(first.actions, second.actions)
-    there = _grouped(after, _place)
-    pairs = sorted((abs(a.start - b.start), a, b) for a in before for b in there.get(_place(a), ()))
+    there = _grouped(after, _site)
+    pairs = sorted((abs(a.start - b.start), a, b) for a in before for b in there.get(_site(a), ()))
     moved = []
     gone, new = Counter(before), Counter(after)
     for _, a, b in pairs:
@@ -144,14 +144,14 @@ def _is_at_same_time(a: PlannedAction, b: PlannedAction) -> bool:
 
 
 def _task(action: PlannedAction) -> tuple[str, ...]:
-    return action.satellite_id, action.mode, action.place_id
+    return action.satellite_id, action.mode, action.site_id
 
 
-def _place(action: PlannedAction) -> tuple[str, ...]:
+def _site(action: PlannedAction) -> tuple[str, ...]:
     """Return what an action is still known by when it moves."""
     if action.mode == "collect":
-        return action.mode, action.place_id
-    return action.mode, action.place_id, action.satellite_id
+        return action.mode, action.site_id
+    return action.mode, action.site_id, action.satellite_id
 
 
 def _differences(

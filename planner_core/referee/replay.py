@@ -40,13 +40,13 @@ def plan_sha256(problem: Problem, plan: Plan) -> str:
     content = []
     for action in plan.actions:
         i = action.opportunity
-        place = int(table.place[i])
+        site = int(table.site[i])
         is_collect = table.kind[i] == COLLECT
         content.append(
             [
                 int(table.satellite[i]),
                 "collect" if is_collect else "contact",
-                problem.target_ids[place] if is_collect else place,
+                problem.target_ids[site] if is_collect else site,
                 round(action.start_s * 1000),
                 round(action.end_s * 1000),
             ]
@@ -138,8 +138,8 @@ def _collected(
     is_image = table.kind[columns.row] == COLLECT
     is_image[list(blamed)] = False
     images = order[is_image[order]]
-    place = table.place[columns.row[images]]
-    targets, first, count = np.unique(place, return_index=True, return_counts=True)
+    site = table.site[columns.row[images]]
+    targets, first, count = np.unique(site, return_index=True, return_counts=True)
     best = images[first]
     duplicates = []
     is_known = np.zeros(len(targets), dtype=np.bool_)
@@ -147,7 +147,7 @@ def _collected(
         is_known = np.isin(targets, [image.target for image in problem.on_board])
     by_first = np.argsort(first)
     for target in by_first[((count > 1) | is_known)[by_first]].tolist():
-        positions = images[place == targets[target]].tolist()
+        positions = images[site == targets[target]].tolist()
         if is_known[target]:
             duplicates += [_has_been_imaged(problem, plan, position) for position in positions]
         else:
@@ -182,7 +182,7 @@ def _beside_better(
             why = "is collected already"
             continue
         row = plan.actions[position].opportunity
-        target = problem.target_ids[int(problem.opportunities.place[row])]
+        target = problem.target_ids[int(problem.opportunities.site[row])]
         found.append(
             Violation(code="duplicate", satellite=int(problem.opportunities.satellite[row]),
                       needed=1.0, available=2.0, at_s=plan.actions[position].start_s,
@@ -193,7 +193,7 @@ def _beside_better(
 
 def _has_been_imaged(problem: Problem, plan: Plan, position: int) -> Violation:
     action, table = plan.actions[position], problem.opportunities
-    target = problem.target_ids[int(table.place[action.opportunity])]
+    target = problem.target_ids[int(table.site[action.opportunity])]
     return Violation(
         code="duplicate", satellite=int(table.satellite[action.opportunity]), needed=1.0,
         available=2.0, at_s=action.start_s, blamed=(),

@@ -113,7 +113,7 @@ def _integrate_physical(problem: Problem, satellite: SatelliteProblem, columns: 
     ]
     # Between these times rates are constant.
     times = np.unique(np.concatenate([[0.0, horizon_s], *(span.ravel() for span in spans)]))
-    tasks, flowing, sunlit, at_sun = (places_of(times, span) for span in spans)
+    tasks, flowing, sunlit, at_sun = (indices_of(times, span) for span in spans)
     power, fill, drain = _rates_over(
         len(times) - 1, tasks, is_contact, flowing, pieces[:, 2].copy(), sunlit, at_sun, each
     )
@@ -131,7 +131,7 @@ def _integrate_physical(problem: Problem, satellite: SatelliteProblem, columns: 
 
 
 @kernel
-def places_of(times: Floats, spans: Floats) -> Longs:
+def indices_of(times: Floats, spans: Floats) -> Longs:
     """Return where each end of some spans stands among ``times``, which hold them all.
 
     Ends come up nearly in order: from one to the next it is a step or two.

@@ -141,7 +141,7 @@ def stations(problem: Problem, plan: Plan) -> list[Violation]:
     contacts = [p for p, a in enumerate(plan.actions) if table.kind[a.opportunity] == CONTACT]
     for position in sorted(contacts, key=lambda p: plan.actions[p]):
         action = plan.actions[position]
-        station = int(table.place[action.opportunity])
+        station = int(table.site[action.opportunity])
         ends = busy.setdefault(station, [])
         while ends and ends[0] <= action.start_s + TIME_TOLERANCE_S:
             heapq.heappop(ends)

@@ -84,7 +84,7 @@ def _crowds(was: PlannedAction, other: PlannedAction, turn_s: Mapping[str, float
     if other.satellite_id == was.satellite_id:
         around = timedelta(seconds=turn_s.get(was.satellite_id, 0.0))
         return other.start < was.end + around and other.end > was.start - around
-    is_same_station = was.mode == other.mode == "contact" and was.place_id == other.place_id
+    is_same_station = was.mode == other.mode == "contact" and was.site_id == other.site_id
     return is_same_station and other.start < was.end and other.end > was.start
 
 

@@ -63,7 +63,7 @@ def with_days_replanned(best: Incumbent, touched: Sequence[int], budget: Budget,
 def _searched(best: Incumbent, seed: int) -> Plan:
     search = ResourceSearch(best, seed)
     unit = max(best.unit, best.bound.value / TUNING.max_units)
-    search.search(search.turns(unit), TUNING.rounds)
+    search.search(search.alternating(unit), TUNING.rounds)
     return best.plan
 
 
@@ -72,7 +72,7 @@ def _beside_others(problem: Problem, plan: Plan, satellite: int) -> Ints:
     table, own = problem.opportunities, problem.satellites[satellite].rows
     taken = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
     others = taken[table.satellite[taken] != satellite]
-    imaged = table.place[others[table.kind[others] == COLLECT]]
+    imaged = table.site[others[table.kind[others] == COLLECT]]
     is_shut = blocked_rows(problem, problem.satellites[satellite], others.tolist()) != 0
-    is_free = ~is_shut & ((table.kind[own] == CONTACT) | ~np.isin(table.place[own], imaged))
+    is_free = ~is_shut & ((table.kind[own] == CONTACT) | ~np.isin(table.site[own], imaged))
     return np.sort(own[is_free]).astype(np.int32)

@@ -19,11 +19,11 @@ from planner_core.certified.proofs.resource_bound import value_at
 from planner_core.problem import Problem
 
 _LEFT: Final = 0.5  # of a typical reward; with it all, 1 to 4 images above the optimum
-_NO_PRICES: Final = np.empty(0)
+_NO_MULTIPLIERS: Final = np.empty(0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class KnownPrices:
+class KnownMultipliers:
     """The bound of the plan before, with multipliers, and the targets that they are of."""
 
     bound: Bound
@@ -32,23 +32,24 @@ class KnownPrices:
     def on(self, problem: Problem) -> Bound | None:
         """Return the multipliers for another problem's targets; None where there are none to ask.
 
-        An image of a target that is new earns beyond its price a part of what a typical one earns:
-        at less a path would take one that is dear at every pass, and at its full worth it would
-        pay for an image that a typical one gives way to. Under battery and recorder one that is
-        worth no more than that has the price of half of those before: with 100 of them at half
-        their worth four satellites were bound by 1,173, without a price by 1,123, which is what the
-        search for a proof says. Seven days of replans let such bounds drift from 3 to 50 % above.
+        An image of a target that is new earns beyond its multiplier a part of what a typical one
+        earns: at less a path would take one that is dear at every pass, and at its full worth it
+        would pay for an image that a typical one gives way to. Under battery and recorder one that
+        is worth no more than that has the multiplier of half of those before: with 100 of them at
+        half their worth four satellites were bound by 1,173, without a multiplier by 1,123, which
+        is what the search for a proof says. Seven days of replans let such bounds drift from 3 to
+        50 % above.
         """
-        prices = self.bound.prices
-        is_plain = self.bound.contact_prices is None and problem.pointing is None
-        if prices is None or not is_plain or len(prices) != len(self.target_ids):
+        multipliers = self.bound.multipliers
+        is_plain = self.bound.contact_multipliers is None and problem.pointing is None
+        if multipliers is None or not is_plain or len(multipliers) != len(self.target_ids):
             return None
-        before = dict(zip(self.target_ids, prices.tolist(), strict=True))
+        before = dict(zip(self.target_ids, multipliers.tolist(), strict=True))
         new = np.maximum(0.0, problem.best_worth - _LEFT * problem.typical_worth)
-        if problem.use_resources and len(prices):
-            # Where energy is short most targets have no price, and those that come in neither.
+        if problem.use_resources and len(multipliers):
+            # Where energy is short most targets have no multiplier, and those that come in neither.
             is_usual = problem.best_worth <= problem.typical_worth
-            new[is_usual] = np.minimum(new, np.median(prices))[is_usual]
+            new[is_usual] = np.minimum(new, np.median(multipliers))[is_usual]
         known = [before.get(name, new[i]) for i, name in enumerate(problem.target_ids)]
         unit = self.bound.unit
         is_coarse = unit is not None and unit > _LEFT * problem.typical_worth
@@ -56,8 +57,8 @@ class KnownPrices:
             # What is left of a new target is then whole units too. Once: replan after replan with
             # half the unit of the one before would ask for ever more labels.
             unit *= _LEFT
-        prices = np.minimum(known, problem.best_worth)
-        return replace(self.bound, prices=prices, unit=unit, certificate=None)
+        multipliers = np.minimum(known, problem.best_worth)
+        return replace(self.bound, multipliers=multipliers, unit=unit, certificate=None)
 
 
 def bound_at(problem: Problem, known: Bound, reward: float) -> Bound:
@@ -68,24 +69,24 @@ def bound_at(problem: Problem, known: Bound, reward: float) -> Bound:
     reward
         What a known plan earns: nothing below it needs proof.
     """
-    prices = _NO_PRICES if known.prices is None else known.prices
+    multipliers = _NO_MULTIPLIERS if known.multipliers is None else known.multipliers
     if known.unit is not None and problem.use_resources:
-        value = value_at(problem, prices, known.unit, reward)
+        value = value_at(problem, multipliers, known.unit, reward)
     elif known.is_elementary:
-        value, _ = elementary_value(problem, prices)
+        value, _ = elementary_value(problem, multipliers)
     else:
-        value, _ = lagrangian_value(problem, prices)
+        value, _ = lagrangian_value(problem, multipliers)
     return Bound(
         value=rounded_bound(problem, value, reward),
         proof="dp" if known.unit is not None and problem.use_resources else "lagrangian",
-        prices=prices,
+        multipliers=multipliers,
         unit=known.unit if problem.use_resources else None,
         is_elementary=known.is_elementary,
     )
 
 
-def prices_of(bound: Bound | None, target_ids: Sequence[str]) -> KnownPrices | None:
+def multipliers_of(bound: Bound | None, target_ids: Sequence[str]) -> KnownMultipliers | None:
     """Return a bound's multipliers as what is known; None where it has none."""
-    if bound is None or bound.prices is None:
+    if bound is None or bound.multipliers is None:
         return None
-    return KnownPrices(bound=bound, target_ids=tuple(target_ids))
+    return KnownMultipliers(bound=bound, target_ids=tuple(target_ids))

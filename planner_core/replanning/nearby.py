@@ -72,19 +72,19 @@ def nearby(question: Question, plan: Plan) -> Nearby | None:
     is_taken[[action.opportunity for action in plan.actions]] = True
     targets = [*news.targets, *(lost.target for lost in news.lost if lost.target is not None)]
     is_image = table.kind == COLLECT
-    is_asked = is_image & np.isin(table.place, targets)
+    is_asked = is_image & np.isin(table.site, targets)
     is_near = _near(question, news, is_asked)
     is_near[question.base] |= ~is_taken[question.base]
-    imaged = np.unique(table.place[is_near & is_taken & is_image])
-    is_offered = is_near | (is_image & np.isin(table.place, imaged))
+    imaged = np.unique(table.site[is_near & is_taken & is_image])
+    is_offered = is_near | (is_image & np.isin(table.site, imaged))
     is_part = is_offered.copy()
     for satellite in problem.satellites:
         own = satellite.rows
         begin, end = near_in_time(satellite, np.flatnonzero(is_offered[own]))
         is_part[own] |= _within(len(own), begin, end) & is_taken[own]
     # What stays imaged elsewhere needs no other image.
-    outside = np.unique(table.place[is_taken & is_image & ~is_part])
-    is_part &= is_taken | ~(is_image & np.isin(table.place, outside))
+    outside = np.unique(table.site[is_taken & is_image & ~is_part])
+    is_part &= is_taken | ~(is_image & np.isin(table.site, outside))
     if is_part.sum() > _MOST * len(table):
         return None
     rows = np.flatnonzero(is_part).astype(np.int32)

@@ -9,7 +9,7 @@ from planner_core.access.scenario_opportunities import ScenarioOpportunities
 from planner_core.budget import Budget
 from planner_core.certified.proofs.bound import Bound
 from planner_core.domain import Scenario
-from planner_core.replanning.known import KnownPrices, prices_of
+from planner_core.replanning.known import KnownMultipliers, multipliers_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,9 +30,9 @@ class PlanBefore:
     imaged: frozenset[str] | None = None
 
     @property
-    def prices(self) -> KnownPrices | None:
+    def multipliers(self) -> KnownMultipliers | None:
         """The multipliers of its targets, where it has any."""
-        return prices_of(self.bound, [target.id for target in self.scenario.targets])
+        return multipliers_of(self.bound, [target.id for target in self.scenario.targets])
 
     def opportunities_of(self, scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
         """Return those of the scenario that follows, of which only what is new is looked for."""

@@ -45,13 +45,13 @@ def _with_downlink(question: Question, plan: Plan, target: int) -> Plan:
     problem = question.problem
     table, kept = problem.opportunities, set(problem.kept_rows.tolist())
     taken = [action.opportunity for action in plan.actions]
-    own = [row for row in taken if table.kind[row] == COLLECT and table.place[row] == target]
+    own = [row for row in taken if table.kind[row] == COLLECT and table.site[row] == target]
     images = [*own, *(row for row in problem.collects_of(target).tolist() if row not in own)]
-    holders = [(int(table.satellite[row]), float(table.end_s[row]), [row]) for row in images]
-    holders += [(i.satellite, 0.0, []) for i in question.on_board if i.target == target]
+    imaged_by_all = [(int(table.satellite[row]), float(table.end_s[row]), [row]) for row in images]
+    imaged_by_all += [(i.satellite, 0.0, []) for i in question.on_board if i.target == target]
     deadline_s = question.deadline_s[target]
     best, fewest = plan, len(question.missing(plan))
-    for satellite, from_s, rows in holders:
+    for satellite, from_s, rows in imaged_by_all:
         others = [row for row in taken if row not in own or row in kept or row in rows]
         for contact in problem.satellites[satellite].rows.tolist():
             start_s = table.start_s[contact]

@@ -104,7 +104,7 @@ class Question:
     def is_promised(self) -> Bools:
         """Whether each row is an image of a promised target. Shape ``(n,)``."""
         table = self.problem.opportunities
-        is_promised: Bools = np.isin(table.place, self.promised) & (table.kind == COLLECT)
+        is_promised: Bools = np.isin(table.site, self.promised) & (table.kind == COLLECT)
         return is_promised
 
     @cached_property
@@ -159,7 +159,7 @@ class Question:
         """Return the promised targets that a plan does not image, or brings down too late."""
         table = self.problem.opportunities
         imaged = {
-            int(table.place[action.opportunity])
+            int(table.site[action.opportunity])
             for action in plan.actions
             if table.kind[action.opportunity] == COLLECT
         }

@@ -22,7 +22,7 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.referee.resource_profile import Curve, integrate
 from planner_core.referee.unavoidable import beyond_from_s
-from planner_core.replanning.known import KnownPrices
+from planner_core.replanning.known import KnownMultipliers
 from planner_core.replanning.promises import require_promises, with_promised
 from planner_core.replanning.question import Question
 from planner_core.replanning.repair import repaired
@@ -78,7 +78,7 @@ def replanned(
     solver: Solver,
     budget: Budget,
     seed: int,
-    known: KnownPrices | None = None,
+    known: KnownMultipliers | None = None,
 ) -> Solution:
     """Return the plan that follows the base, from whatever it begins with.
 

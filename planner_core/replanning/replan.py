@@ -23,7 +23,7 @@ from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 from planner_core.replanning.days import has_days, with_days_replanned
-from planner_core.replanning.known import KnownPrices, bound_at
+from planner_core.replanning.known import KnownMultipliers, bound_at
 from planner_core.replanning.nearby import nearby
 from planner_core.replanning.programs import fewest_changes, mixed
 from planner_core.replanning.promises import require_promises, with_promised
@@ -54,7 +54,7 @@ def solve_replan(
     solver: Solver,
     budget: Budget,
     seed: int,
-    known: KnownPrices | None = None,
+    known: KnownMultipliers | None = None,
 ) -> Solution:
     """Return the plan that follows the base.
 
@@ -95,7 +95,7 @@ def solve_replan(
     return _solution(question, plan, best, budget)
 
 
-def _is_no_more_open(question: Question, known: KnownPrices | None, best: Incumbent) -> bool:
+def _is_no_more_open(question: Question, known: KnownMultipliers | None, best: Incumbent) -> bool:
     """Return whether plan and bound are no further apart than in the plan before.
 
     Then what is left open is nothing that has happened, and no reason to plan all anew. Asked where
@@ -221,11 +221,11 @@ def _best(question: Question, *plans: Plan) -> Plan:
     return best
 
 
-def _first_bound(problem: Problem, known: KnownPrices | None, reward: float) -> Bound:
+def _first_bound(problem: Problem, known: KnownMultipliers | None, reward: float) -> Bound:
     """Return what the multipliers of the plan before prove, or a bound made from nothing."""
-    prices = None if known is None else known.on(problem)
-    if prices is not None:
-        return bound_at(problem, prices, reward)
+    multipliers = None if known is None else known.on(problem)
+    if multipliers is not None:
+        return bound_at(problem, multipliers, reward)
     if problem.use_resources:
         return quick_bound(problem, reward)
     return lagrangian_bound(problem, reward)

@@ -58,8 +58,7 @@ def _linked(question: Question, row: int, others: set[int]) -> Iterator[int]:
     blocked = set(conflicts(question.problem, row, sorted(others)))
     for other in others:
         is_same = (
-            table.kind[row] == table.kind[other] == COLLECT
-            and table.place[row] == table.place[other]
+            table.kind[row] == table.kind[other] == COLLECT and table.site[row] == table.site[other]
         )
         if is_same or other in blocked:
             yield other

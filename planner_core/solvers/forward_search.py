@@ -43,7 +43,7 @@ from planner_core.solvers.base import (
     Solution,
 )
 from planner_core.solvers.priced import better_of
-from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.sequential import Subproblem, plan_in_turn
 from planner_core.solvers.walk import contact_above_metadata
 
 Discount = Literal["action", "next_action"]
@@ -149,19 +149,19 @@ def _select_action(
             row, battery_after, recorder_after,
         )  # fmt: skip
         if depth > 1:
-            place = track.place[row]
+            site = track.site[row]
             is_new = (
                 not track.is_contact[row]
-                and not collected[place]
+                and not collected[site]
                 and counts_as_made(track, guidance, battery_after, recorder_after)
             )
             if is_new:
-                collected[place] = 1
+                collected[site] = 1
             a_next, v_next, first_next = _select_action(
                 search, row, row, battery_after, recorder_after, depth - 1
             )
             if is_new:
-                collected[place] = 0
+                collected[site] = 0
             if rules.is_discounted_by_next and a_next != NOTHING:
                 row_next = first_next if a_next == WAIT else a_next
                 discount = guidance.gamma ** (track.start_s[row_next] - now_s)
@@ -310,14 +310,16 @@ class ForwardSearch:
         """Return the plan; the same one whatever the seed."""
         guidance = self.guidance
 
-        def plan_turn(turn: Turn) -> list[int]:
-            fresh = replace(turn, collected=turn.collected.copy())
-            rows = self._plan_turn(turn, problem.worth[turn.satellite.rows], guidance, budget)
+        def plan_one(subproblem: Subproblem) -> list[int]:
+            fresh = replace(subproblem, collected=subproblem.collected.copy())
+            rows = self._plan_turn(
+                subproblem, problem.worth[subproblem.satellite.rows], guidance, budget
+            )
             if self.feasibility == "penalty" or budget.is_spent():
                 return rows
             return better_of(problem, fresh, rows, looks_ahead=True)
 
-        solution = plan_in_turn(problem, budget, plan_turn)
+        solution = plan_in_turn(problem, budget, plan_one)
         return polished(problem, solution, self.window_moves_per_task, budget)
 
     @property
@@ -333,9 +335,9 @@ class ForwardSearch:
         )
 
     def _plan_turn(
-        self, turn: Turn, worth: Floats, guidance: Guidance, budget: Budget
+        self, subproblem: Subproblem, worth: Floats, guidance: Guidance, budget: Budget
     ) -> list[int]:
-        track, collected = turn.track, turn.collected
+        track, collected = subproblem.track, subproblem.collected
         cursor, last = NO_TASK, NO_TASK
         battery, recorder = track.resources.battery_start, track.resources.recorder_start
         breadth = self.breadth + (self.breadth_counts == "one_more")
@@ -362,16 +364,16 @@ class ForwardSearch:
                 battery, recorder, _ = take(track.resources, last, action, battery, recorder)
             cursor = last = action
             taken.append(action)
-            place = track.place[action]
+            site = track.site[action]
             if (
                 not track.is_contact[action]
-                and not collected[place]
+                and not collected[site]
                 and (
                     self.image_needs == "nothing"
                     or counts_as_made(track, guidance, battery, recorder)
                 )
             ):
-                collected[place] = 1
+                collected[site] = 1
                 reward += float(worth[action])
-            turn.report((action + 1) / len(track.start_s), reward)
+            subproblem.report((action + 1) / len(track.start_s), reward)
         return taken

@@ -16,7 +16,7 @@ from planner_core.budget import Budget
 from planner_core.precedence.chains import chain_with_history, heaviest_chain
 from planner_core.problem import Problem
 from planner_core.solvers.base import Constraint, Feasibility, Outlook, Solution
-from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.sequential import Subproblem, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,
     NOTHING_TAKEN,
@@ -68,22 +68,22 @@ class Graph:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""
 
-        def plan_turn(turn: Turn) -> list[int]:
-            track = turn.track
-            is_wanted = (track.is_contact == 0) & (turn.collected[track.place] == 0)
-            weight = np.where(is_wanted, problem.worth[turn.satellite.rows], 0.0)
+        def plan_one(subproblem: Subproblem) -> list[int]:
+            track = subproblem.track
+            is_wanted = (track.is_contact == 0) & (subproblem.collected[track.site] == 0)
+            weight = np.where(is_wanted, problem.worth[subproblem.satellite.rows], 0.0)
             if self.path == "longest":
-                path = heaviest_chain(turn.satellite, weight)
+                path = heaviest_chain(subproblem.satellite, weight)
             else:
-                path = chain_with_history(turn.satellite, weight, track.place)
-            path = _with_kept(problem, turn, path)
+                path = chain_with_history(subproblem.satellite, weight, track.site)
+            path = _with_kept(problem, subproblem, path)
             if problem.use_resources and self.feasibility == "hard":
                 off_path = track.is_contact == 0
                 off_path[path] = False
                 narrowed = track._replace(blocked=track.blocked | off_path.astype(np.uint8))
                 rows = rule_plan(
                     narrowed,
-                    turn.collected,
+                    subproblem.collected,
                     True,
                     True,
                     self.contact_above_fraction,
@@ -91,19 +91,25 @@ class Graph:
                     False,
                 )
                 path = [int(row) for row in rows]
-            turn.report(1.0, float(weight[path].sum()))
+            subproblem.report(1.0, float(weight[path].sum()))
             return path
 
-        return plan_in_turn(problem, budget, plan_turn)
+        return plan_in_turn(problem, budget, plan_one)
 
 
-def _with_kept(problem: Problem, turn: Turn, path: list[int]) -> list[int]:
+def _with_kept(problem: Problem, subproblem: Subproblem, path: list[int]) -> list[int]:
     """Return the path with what must be taken, or the rule's where that does not fit in."""
-    kept = problem.kept_local(turn.satellite).tolist()
+    kept = problem.kept_local(subproblem.satellite).tolist()
     whole = sorted({*path, *kept})
-    if all(turn.satellite.transitions.allows(a, b) for a, b in itertools.pairwise(whole)):
+    if all(subproblem.satellite.transitions.allows(a, b) for a, b in itertools.pairwise(whole)):
         return whole
     rows = rule_plan(
-        turn.track, turn.collected.copy(), True, True, CONTACT_ABOVE, NOTHING_TAKEN, False
+        subproblem.track,
+        subproblem.collected.copy(),
+        True,
+        True,
+        CONTACT_ABOVE,
+        NOTHING_TAKEN,
+        False,
     )
-    return [int(row) for row in rows if row in kept or not turn.track.is_contact[row]]
+    return [int(row) for row in rows if row in kept or not subproblem.track.is_contact[row]]

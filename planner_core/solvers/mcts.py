@@ -36,7 +36,7 @@ from planner_core.solvers.mcts_tree import (
     new_node,
 )
 from planner_core.solvers.priced import better_of, with_choices
-from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.sequential import Subproblem, plan_in_turn
 from planner_core.solvers.walk import contact_above_metadata
 
 MAX_ACTIONS: Final = 10_000_000
@@ -206,14 +206,16 @@ class Mcts:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one for the same seed."""
 
-        def plan_turn(turn: Turn) -> list[int]:
-            fresh = replace(turn, collected=turn.collected.copy())
-            rows = self._plan_turn(turn, problem.worth[turn.satellite.rows], budget, seed)
+        def plan_one(subproblem: Subproblem) -> list[int]:
+            fresh = replace(subproblem, collected=subproblem.collected.copy())
+            rows = self._plan_turn(
+                subproblem, problem.worth[subproblem.satellite.rows], budget, seed
+            )
             if self.feasibility == "penalty" or budget.is_spent():
                 return rows
             return better_of(problem, fresh, rows, looks_ahead=True)
 
-        solution = plan_in_turn(problem, budget, plan_turn)
+        solution = plan_in_turn(problem, budget, plan_one)
         if self.feasibility == "hard":
             solution = with_choices(problem, solution, budget, seed)
         return polished(problem, solution, self.window_moves_per_task, budget)
@@ -244,8 +246,10 @@ class Mcts:
             contact_above=self.contact_above_fraction,
         )
 
-    def _plan_turn(self, turn: Turn, worth: Floats, budget: Budget, seed: int) -> list[int]:
-        track, collected = turn.track, turn.collected
+    def _plan_turn(
+        self, subproblem: Subproblem, worth: Floats, budget: Budget, seed: int
+    ) -> list[int]:
+        track, collected = subproblem.track, subproblem.collected
         guidance, rules = self._guidance, self._rules
         # A state stays in the tree for at most ``depth`` steps, so no more ever hang together.
         # Where that is more than memory should hold, the rest is sampled by rollouts alone.
@@ -274,19 +278,19 @@ class Mcts:
             child = int(tree.child[edge])
             if action != WAIT:
                 taken.append(action)
-                place = track.place[action]
+                site = track.site[action]
                 levels = float(tree.battery[child]), float(tree.recorder[child])
                 if (
                     not track.is_contact[action]
-                    and not collected[place]
+                    and not collected[site]
                     and (self.image_needs == "nothing" or counts_as_made(track, guidance, *levels))
                 ):
-                    collected[place] = step.successors.imaged[place] = 1
+                    collected[site] = step.successors.imaged[site] = 1
                     reward += float(worth[action])
             step.best[0] = -np.inf
             copy_branch(tree, spare, child)
             tree, spare = spare, tree
-            turn.report((int(tree.cursor[0]) + 1) / len(track.start_s), reward)
+            subproblem.report((int(tree.cursor[0]) + 1) / len(track.start_s), reward)
         return taken
 
 

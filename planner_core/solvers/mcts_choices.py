@@ -120,7 +120,7 @@ def _enter_tasks(
         while at < known and end < begin + rules.breadth:
             row = successors.row[at]
             at += 1
-            if track.is_contact[row] or not rules.unimaged_only or not collected[track.place[row]]:
+            if track.is_contact[row] or not rules.unimaged_only or not collected[track.site[row]]:
                 actions[end] = row
                 end += 1
         if is_all:
@@ -182,7 +182,7 @@ def greedy_action(
         is_all = end - at < MOST
         while at < end:
             row = successors.row[at]
-            if track.is_contact[row] or not collected[track.place[row]]:
+            if track.is_contact[row] or not collected[track.site[row]]:
                 return row, successors.discount[at]
             at += 1
         if is_all:

@@ -90,14 +90,14 @@ def _simulate(tree: Tree, step: Step) -> None:
                 row, battery, recorder,
             )  # fmt: skip
             last = row
-            place = track.place[row]
+            site = track.site[row]
             if (
                 not track.is_contact[row]
-                and not collected[place]
+                and not collected[site]
                 and counts_as_made(track, guidance, battery, recorder)
             ):
-                collected[place] = 1
-                path.image[d] = place
+                collected[site] = 1
+                path.image[d] = site
         path.action[d] = action
         path.discount[d] = guidance.gamma if rules.is_per_decision else discount
         cursor = row

@@ -30,7 +30,7 @@ from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bytes, Floats, Ints, Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
-from planner_core.solvers.sequential import Turn
+from planner_core.solvers.sequential import Subproblem
 
 _PRICES: Final = (0.0, 0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
 """Of an image's worth, for what an image draws."""
@@ -63,18 +63,18 @@ class Priced(NamedTuple):
     following: float
 
 
-def is_priced(problem: Problem, turn: Turn) -> bool:
-    """Return whether the turn's satellite charges at the sun only."""
-    return problem.use_resources and turn.satellite.resources.sun_pointing == "slew"
+def is_priced(problem: Problem, subproblem: Subproblem) -> bool:
+    """Return whether the subproblem's satellite charges at the sun only."""
+    return problem.use_resources and subproblem.satellite.resources.sun_pointing == "slew"
 
 
-def best_priced(problem: Problem, turn: Turn, *, looks_ahead: bool) -> Priced:
+def best_priced(problem: Problem, subproblem: Subproblem, *, looks_ahead: bool) -> Priced:
     """Return the best plan over all prices, of the rule or with a look ahead at what follows."""
-    track = turn.track
-    worth = np.where(track.is_contact == 1, 0.0, problem.worth[turn.satellite.rows])
-    is_new = (track.is_contact == 0) & (turn.collected[track.place] == 0)
+    track = subproblem.track
+    worth = np.where(track.is_contact == 1, 0.0, problem.worth[subproblem.satellite.rows])
+    is_new = (track.is_contact == 0) & (subproblem.collected[track.site] == 0)
     draw, image = _typical(track, worth, is_new)
-    network = strict_network_of(problem, turn.satellite) if looks_ahead else None
+    network = strict_network_of(problem, subproblem.satellite) if looks_ahead else None
     breadth = _AHEAD if looks_ahead else 1
     best = Priced([], -1.0, 0.0, 0.0)
     for price in _PRICES:
@@ -84,7 +84,7 @@ def best_priced(problem: Problem, turn: Turn, *, looks_ahead: bool) -> Priced:
             ahead = values_ahead(network, np.where(is_new, worth, 0.0), per_energy)
         for following in _FOLLOWING if price > 0.0 else (0.0,):
             for contact_above in _CONTACTS_ABOVE:
-                collected = turn.collected.copy()
+                collected = subproblem.collected.copy()
                 rows = priced_plan(
                     track, worth, collected, ahead, per_energy, following, contact_above, breadth
                 )
@@ -94,18 +94,20 @@ def best_priced(problem: Problem, turn: Turn, *, looks_ahead: bool) -> Priced:
     return best
 
 
-def better_of(problem: Problem, turn: Turn, rows: list[int], *, looks_ahead: bool) -> list[int]:
+def better_of(
+    problem: Problem, subproblem: Subproblem, rows: list[int], *, looks_ahead: bool
+) -> list[int]:
     """Return a search's plan, or a priced one that earns more."""
-    if not is_priced(problem, turn):
+    if not is_priced(problem, subproblem):
         return rows
-    track = turn.track
+    track = subproblem.track
     own = np.array(rows, dtype=np.int64)
-    images = own[(track.is_contact[own] == 0) & (turn.collected[track.place[own]] == 0)]
-    gained = problem.worth_of(turn.satellite.rows[images])
-    priced = best_priced(problem, turn, looks_ahead=looks_ahead)
+    images = own[(track.is_contact[own] == 0) & (subproblem.collected[track.site[own]] == 0)]
+    gained = problem.worth_of(subproblem.satellite.rows[images])
+    priced = best_priced(problem, subproblem, looks_ahead=looks_ahead)
     if priced.worth <= gained:
         return rows
-    turn.report(1.0, priced.worth)
+    subproblem.report(1.0, priced.worth)
     return priced.rows
 
 
@@ -195,7 +197,7 @@ def priced_plan(
             return rows[:count]
         battery, recorder, _ = take(track.resources, last, is_chosen, battery, recorder)
         if not track.is_contact[is_chosen]:
-            collected[track.place[is_chosen]] = 1
+            collected[track.site[is_chosen]] = 1
         rows[count] = is_chosen
         count += 1
         cursor = last = is_chosen

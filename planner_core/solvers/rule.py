@@ -9,7 +9,7 @@ from planner_core.budget import Budget
 from planner_core.problem import Problem
 from planner_core.solvers.base import Constraint, Feasibility, Outlook, Solution
 from planner_core.solvers.priced import better_of
-from planner_core.solvers.sequential import Turn, plan_in_turn
+from planner_core.solvers.sequential import Subproblem, plan_in_turn
 from planner_core.solvers.walk import (
     CONTACT_ABOVE,
     NOTHING_TAKEN,
@@ -70,11 +70,11 @@ class Rule:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the plan; the same one whatever the seed."""
 
-        def plan_turn(turn: Turn) -> list[int]:
-            track, before = turn.track, turn.collected.copy()
+        def plan_one(subproblem: Subproblem) -> list[int]:
+            track, before = subproblem.track, subproblem.collected.copy()
             rows = rule_plan(
                 track,
-                turn.collected,
+                subproblem.collected,
                 self.feasibility == "hard",
                 self.unimaged_only,
                 self.contact_above_fraction,
@@ -82,12 +82,12 @@ class Rule:
                 self.thresholds == "code",
             )
             images = rows[track.is_contact[rows] == 0]
-            images = images[before[track.place[images]] == 0]
-            turn.report(1.0, problem.worth_of(turn.satellite.rows[images]))
+            images = images[before[track.site[images]] == 0]
+            subproblem.report(1.0, problem.worth_of(subproblem.satellite.rows[images]))
             taken = [int(row) for row in rows]
             if self.feasibility == "penalty" or self.thresholds == "code":
                 return taken
-            fresh = replace(turn, collected=before)
+            fresh = replace(subproblem, collected=before)
             return better_of(problem, fresh, taken, looks_ahead=False)
 
-        return plan_in_turn(problem, budget, plan_turn)
+        return plan_in_turn(problem, budget, plan_one)

@@ -22,7 +22,7 @@ from planner_core.solvers.walk import CONTACT_ABOVE, rule_plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Turn:
+class Subproblem:
     """One satellite's turn: its arrays, and what the satellites before it have taken.
 
     Attributes
@@ -39,11 +39,11 @@ class Turn:
     report: Callable[[float, float], None]
 
 
-PlanTurn = Callable[[Turn], list[int]]
+PlanSubproblem = Callable[[Subproblem], list[int]]
 """Returns the rows (of the track) that the satellite takes, in order."""
 
 
-def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solution:
+def plan_in_turn(problem: Problem, budget: Budget, plan_one: PlanSubproblem) -> Solution:
     """Let each satellite plan over the targets that remain and the antennas still free.
 
     Once the budget is spent, the rule plans what is left of the horizon and of the satellites.
@@ -68,14 +68,16 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_turn: PlanTurn) -> Solut
 
         blocked = blocked_rows(problem, satellite, taken) | _is_wasted(problem, satellite)
         track = compile_track(problem, satellite, blocked)
-        turn = Turn(satellite=satellite, track=track, collected=collected.copy(), report=report)
-        rows = [] if budget.is_spent() else plan_turn(turn)
+        subproblem = Subproblem(
+            satellite=satellite, track=track, collected=collected.copy(), report=report
+        )
+        rows = [] if budget.is_spent() else plan_one(subproblem)
         if budget.is_spent():
             rows = rows + _rest_by_rule(track, collected.copy(), rows)
         chosen = satellite.rows[np.asarray(rows, dtype=np.int64)]
         taken.extend(int(row) for row in chosen)
         images = chosen[table.kind[chosen] != CONTACT]
-        collected[table.place[images]] = 1
+        collected[table.site[images]] = 1
     termination = budget.termination() if budget.is_spent() else Termination.HORIZON_COMPLETE
     return Solution(plan=Plan.of(problem, taken), termination=termination)
 
@@ -99,7 +101,7 @@ def _is_wasted(problem: Problem, satellite: SatelliteProblem) -> Bytes:
     """
     is_image = satellite.kind != CONTACT
     wasted = np.zeros(len(satellite), dtype=np.uint8)
-    wasted[is_image] = problem.best_worth[satellite.place[is_image]] > 0.0
+    wasted[is_image] = problem.best_worth[satellite.site[is_image]] > 0.0
     wasted[problem.worth[satellite.rows] > 0.0] = 0
     wasted[problem.kept_local(satellite)] = 0
     return wasted
@@ -119,9 +121,9 @@ def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]
     booked = booked[table.kind[booked] == CONTACT]
     if len(booked) == 0:
         return blocked
-    for station in np.unique(table.place[booked]):
-        there = booked[table.place[booked] == station]
-        own = np.flatnonzero((satellite.kind == CONTACT) & (satellite.place == station))
+    for station in np.unique(table.site[booked]):
+        there = booked[table.site[booked] == station]
+        own = np.flatnonzero((satellite.kind == CONTACT) & (satellite.site == station))
         # Those that have begun before the end, without those that end before the start.
         num_busy = np.searchsorted(np.sort(table.start_s[there]), satellite.end_s[own])
         num_busy -= np.searchsorted(

@@ -103,7 +103,7 @@ def rule_plan(
         if track.use_resources:
             battery, recorder, _ = take(track.resources, last, row, battery, recorder)
         if not track.is_contact[row]:
-            collected[track.place[row]] = 1
+            collected[track.site[row]] = 1
         last = row
     while True:
         row = naive_select_action(
@@ -115,7 +115,7 @@ def rule_plan(
         if track.use_resources:
             battery, recorder, _ = take(track.resources, last, row, battery, recorder)
         if not track.is_contact[row]:
-            collected[track.place[row]] = 1
+            collected[track.site[row]] = 1
         rows[count] = row
         count += 1
         last = row

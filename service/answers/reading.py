@@ -25,7 +25,7 @@ from service.wire.base import Body, Id, Instant
 from service.wire.timelines import IDLE_MODES, Mode
 
 _MOST_ACTIONS: Final = 1_000_000
-_PLACES: Final = {"collect": "target", "contact": "station"}
+_SITES: Final = {"collect": "target", "contact": "station"}
 _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "station_id")
 
 
@@ -40,7 +40,7 @@ class ActionIn(Body):
     station_id: Id | None = None
 
     @property
-    def place_id(self) -> str | None:
+    def site_id(self) -> str | None:
         """The target of a collect, the station of a contact."""
         return self.target_id if self.mode == "collect" else self.station_id
 
@@ -51,7 +51,7 @@ class ActionIn(Body):
             end=self.end,
             satellite_id=self.satellite_id,
             mode=self.mode,
-            place_id=str(self.place_id),
+            site_id=str(self.site_id),
         )
 
 
@@ -152,10 +152,10 @@ def plan_in(records: Records, scenario: Scenario, problem: Problem) -> Reading:
         task = one.body.planned()
         action = finder.action(task)
         if action is None:
-            detail = f"{task.satellite_id} has no access to {task.place_id}."
-            impossible.append((_place(one), detail))
+            detail = f"{task.satellite_id} has no access to {task.site_id}."
+            impossible.append((_site(one), detail))
         else:
-            found.append((action, _place(one)))
+            found.append((action, _site(one)))
     found.sort()
     return Reading(
         plan=Plan(tuple(action for action, _ in found)),
@@ -164,7 +164,7 @@ def plan_in(records: Records, scenario: Scenario, problem: Problem) -> Reading:
     )
 
 
-def _place(one: Checked[ActionIn]) -> str:
+def _site(one: Checked[ActionIn]) -> str:
     return one.record.pointers[""] if one.record.row is None else f"line {one.record.row}"
 
 
@@ -178,9 +178,9 @@ class Finder:
             "target": {t.id: i for i, t in enumerate(scenario.targets)},
             "station": {s.id: i for i, s in enumerate(scenario.ground_stations)},
         }
-        self._num_places = len(scenario.targets) + len(scenario.ground_stations) + 1
+        self._num_sites = len(scenario.targets) + len(scenario.ground_stations) + 1
         self._table = table = problem.opportunities
-        keys = self._key(table.satellite.astype(np.int64), table.kind.astype(np.int64), table.place)
+        keys = self._key(table.satellite.astype(np.int64), table.kind.astype(np.int64), table.site)
         self._order = np.argsort(keys, kind="stable")
         self._keys = keys[self._order]
 
@@ -188,16 +188,16 @@ class Finder:
         """Raise where the scenario knows nothing of what an action names."""
         self._require("satellite", action.satellite_id)
         if action.mode not in IDLE_MODES:
-            self._require(_PLACES[action.mode], action.place_id)
+            self._require(_SITES[action.mode], action.site_id)
         if action.end < action.start:
             raise InvalidScenario("invalid_time", "It ends before it starts.", pointer="/end")
 
     def action(self, task: PlannedAction) -> Action | None:
         """Return the action that is meant; None where no opportunity is what it names."""
         satellite = self._numbers["satellite"][task.satellite_id]
-        place = self._numbers[_PLACES[task.mode]][task.place_id]
+        site = self._numbers[_SITES[task.mode]][task.site_id]
         start_s = self._horizon.offset_s(task.start)
-        key = self._key(satellite, COLLECT if task.mode == "collect" else CONTACT, place)
+        key = self._key(satellite, COLLECT if task.mode == "collect" else CONTACT, site)
         first, end = np.searchsorted(self._keys, key), np.searchsorted(self._keys, key, "right")
         rows = self._order[first:end]
         if len(rows) == 0:
@@ -219,8 +219,8 @@ class Finder:
             detail = f"The scenario has no {what} {own_id!r}."
             raise InvalidScenario(f"unknown_{what}", detail, pointer=pointer)
 
-    def _key(self, satellite: Any, kind: Any, place: Any) -> npt.NDArray[np.int64]:
-        return np.asarray((satellite * 2 + kind) * self._num_places + place, dtype=np.int64)
+    def _key(self, satellite: Any, kind: Any, site: Any) -> npt.NDArray[np.int64]:
+        return np.asarray((satellite * 2 + kind) * self._num_sites + site, dtype=np.int64)
 
 
 READERS: Final[dict[str, Callable[[bytes], Records]]] = {

@@ -93,5 +93,5 @@ def planned(timeline: TimelineOut) -> Iterator[PlannedAction]:
                     end=action.end,
                     satellite_id=satellite.id,
                     mode=action.mode,
-                    place_id=str(action.target_id or action.station_id),
+                    site_id=str(action.target_id or action.station_id),
                 )

@@ -273,13 +273,13 @@ class Documents(Wording):
         if row is not None:
             own = table.off_nadir_deg[row], table.azimuth_deg[row]
             off_nadir_deg, azimuth_deg = self._seen.get(action.position, own)
-            place = int(table.place[row])
+            site = int(table.site[row])
             if action.mode == "collect":
-                target = self.scenario.targets[place]
+                target = self.scenario.targets[site]
                 quality = self._images.quality[row]
                 clear = None if self._images.clear is None else self._images.clear[row]
             else:
-                station = self.scenario.ground_stations[place]
+                station = self.scenario.ground_stations[site]
         return ActionOut(
             id=action_id,
             mode=action.mode,

@@ -22,7 +22,7 @@ from service.scenarios.translate import ground_station_from
 from service.stores.finding import alive, existing
 from service.wire.base import Listed
 from service.wire.imports import Imported
-from service.wire.places import (
+from service.wire.sites import (
     GroundStationIn,
     GroundStationOut,
     GroundStationPatch,

@@ -18,8 +18,8 @@ from service.api.errors import problem_responses
 from service.api.examples import add_examples
 from service.api.guard import is_limited, is_open
 from service.wire.operations import ProblemOut
-from service.wire.places import TargetCatalogIn
 from service.wire.proofs import ProofOut
+from service.wire.sites import TargetCatalogIn
 from service.wire.timelines import TimelineOut
 
 router = APIRouter(include_in_schema=False)

@@ -175,17 +175,17 @@ def planned(row: PlanActionRow) -> PlannedAction:
         end=row.end,
         satellite_id=row.satellite_id,
         mode="collect" if row.mode == "collect" else "contact",
-        place_id=row.target_id or row.station_id or "",
+        site_id=row.target_id or row.station_id or "",
     )
 
 
 def _is_lost(question: StoredQuestion, action: PlannedAction) -> bool:
     """Return whether an outage, a failure or a dropped target took an action of the plan."""
-    if action.mode == "collect" and action.place_id in question.pins.forbid:
+    if action.mode == "collect" and action.site_id in question.pins.forbid:
         return True
     is_in_base = question.replan is not None and any(
         one.satellite_id == action.satellite_id
-        and (one.target_id or one.station_id) == action.place_id
+        and (one.target_id or one.station_id) == action.site_id
         and one.start is not None
         and abs((one.start - action.start).total_seconds()) <= _NEAR_S
         for one in question.replan.base
@@ -195,7 +195,7 @@ def _is_lost(question: StoredQuestion, action: PlannedAction) -> bool:
         and action.end > outage.start
         and (
             (outage.satellite_id == action.satellite_id and action.mode in outage.modes)
-            or (outage.station_id is not None and outage.station_id == action.place_id
+            or (outage.station_id is not None and outage.station_id == action.site_id
                 and action.mode == "contact")
         )
         for outage in question.outages

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Response
 from sqlalchemy.orm import Session
 
 from planner_core.access.scenario_opportunities import view_at
-from planner_core.orbits.places import View
+from planner_core.orbits.sites import View
 from planner_core.problem import COLLECT, CONTACT, Opportunities
 from service.access.callers import Caller
 from service.api import job_intake as intake
@@ -173,16 +173,16 @@ def _matching(
         known = [i for i, s in enumerate(scenario.satellites) if s.id == satellite_id]
         wanted &= np.isin(table.satellite, known)
     if target_id is not None:
-        places = [i for i, t in enumerate(scenario.targets) if t.id == target_id]
-        wanted &= (table.kind == COLLECT) & np.isin(table.place, places)
+        sites = [i for i, t in enumerate(scenario.targets) if t.id == target_id]
+        wanted &= (table.kind == COLLECT) & np.isin(table.site, sites)
     return np.flatnonzero(wanted)
 
 
 def _opportunity(described: Described, row: int, **edges: ViewOut) -> OpportunityOut:
     scenario, table = described.scenario, described.computed.opportunities
     is_collect = int(table.kind[row]) == COLLECT
-    places = scenario.targets if is_collect else scenario.ground_stations
-    place = places[int(table.place[row])]
+    sites = scenario.targets if is_collect else scenario.ground_stations
+    site = sites[int(table.site[row])]
     satellite = scenario.satellites[int(table.satellite[row])]
     at = scenario.horizon.instant
     return OpportunityOut(
@@ -190,10 +190,10 @@ def _opportunity(described: Described, row: int, **edges: ViewOut) -> Opportunit
         satellite_id=satellite.id,
         satellite_name=satellite.name,
         kind="collect" if is_collect else "contact",
-        target_id=place.id if is_collect else None,
-        target_name=place.name if is_collect else None,
-        station_id=None if is_collect else place.id,
-        station_name=None if is_collect else place.name,
+        target_id=site.id if is_collect else None,
+        target_name=site.name if is_collect else None,
+        station_id=None if is_collect else site.id,
+        station_name=None if is_collect else site.name,
         start=at(float(table.start_s[row])),
         end=at(float(table.end_s[row])),
         access_start=at(float(table.access_start_s[row])),

@@ -26,8 +26,8 @@ from service.scenarios.spacecraft_views import fleet_of, types_flown, views_of
 from service.scenarios.translate import target_from
 from service.stores import order_store
 from service.stores.finding import find, no_such, of_owner
-from service.wire.places import TargetIn
 from service.wire.scenarios import FileTarget
+from service.wire.sites import TargetIn
 from service.wire.spacecraft_types import BUILT_IN
 
 _WHY = {

@@ -24,7 +24,7 @@ from service.problems.faults import pointer_to, require_none, validated
 from service.scenarios.translate import target_from
 from service.stores.finding import alive, existing
 from service.wire.base import Body, Listed, Name
-from service.wire.places import (
+from service.wire.sites import (
     MAX_TARGETS,
     CreatedCatalog,
     TargetCatalogOut,

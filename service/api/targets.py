@@ -17,7 +17,7 @@ from service.db import clock
 from service.db.rows import TargetCatalogRow, TargetRow
 from service.plans.target_lives import lives_of, plans_by_catalog
 from service.wire.base import Listed
-from service.wire.places import TargetIn
+from service.wire.sites import TargetIn
 from service.wire.stored import from_store
 from service.wire.target_lives import TargetLifeOut, TargetState
 

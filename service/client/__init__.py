@@ -28,9 +28,6 @@ from service.wire.outcomes import ExplanationOut as Explanation
 from service.wire.outcomes import TargetItem as TargetOutcome
 from service.wire.passes import PassOut as Pass
 from service.wire.pins import OutageOut as Outage
-from service.wire.places import GroundStationOut as GroundStation
-from service.wire.places import TargetCatalogOut as TargetCatalog
-from service.wire.places import TargetIn as Target
 from service.wire.plan_diffs import DiffOut as PlanDiff
 from service.wire.plans import ExecutionOut as Execution
 from service.wire.plans import PlanActionOut as PlanAction
@@ -41,6 +38,9 @@ from service.wire.satellites import SatelliteOut as Satellite
 from service.wire.scenarios import OpportunityOut as Opportunity
 from service.wire.scenarios import ScenarioOut as Scenario
 from service.wire.scenarios import ScenarioSummary
+from service.wire.sites import GroundStationOut as GroundStation
+from service.wire.sites import TargetCatalogOut as TargetCatalog
+from service.wire.sites import TargetIn as Target
 from service.wire.target_lives import TargetLifeOut as TargetLife
 from service.wire.timelines import ActionOut as Action
 from service.wire.timelines import SatelliteTimelineOut as SatelliteTimeline

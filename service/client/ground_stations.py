@@ -7,8 +7,8 @@ from typing import Any
 from service.client.collection import Changeable
 from service.client.uploads import Source, upload
 from service.wire.imports import Imported as Import
-from service.wire.places import GroundStationOut as GroundStation
-from service.wire.places import ImportedStation
+from service.wire.sites import GroundStationOut as GroundStation
+from service.wire.sites import ImportedStation
 
 
 class GroundStations(Changeable[GroundStation]):

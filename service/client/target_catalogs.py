@@ -8,9 +8,9 @@ from typing import Any
 from service.client.collection import Changeable
 from service.client.transport import Transport, path_of
 from service.client.uploads import Source, upload
-from service.wire.places import CreatedCatalog
-from service.wire.places import TargetCatalogOut as TargetCatalog
-from service.wire.places import TargetIn as Target
+from service.wire.sites import CreatedCatalog
+from service.wire.sites import TargetCatalogOut as TargetCatalog
+from service.wire.sites import TargetIn as Target
 from service.wire.target_lives import TargetLifeOut as TargetLife
 
 

@@ -26,12 +26,12 @@ from planner_core.access.scenario_opportunities import compute_opportunities
 from planner_core.budget import Budget
 from planner_core.build import build_problem
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.alternating import AlternatingSearch
 from planner_core.certified.multipliers.data import DataPaths
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.proofs.queues import queue_value
-from planner_core.certified.strategies.agility import FreeSearch
+from planner_core.certified.strategies.agility import AgilitySearch
 from planner_core.certified.strategies.fleet import FleetSearch
 from planner_core.domain import (
     Agility,
@@ -229,7 +229,7 @@ def _continuous() -> None:
     _plan(crowd, Rule(), Certified(moves_per_task=1.0))
     problem = _built(crowd)
     image = Rule().solve(problem, Budget(), 0).plan.actions[0]
-    target = problem.target_ids[problem.opportunities.place[image.opportunity]]
+    target = problem.target_ids[problem.opportunities.site[image.opportunity]]
     start = crowd.horizon.start + timedelta(seconds=image.start_s)
     kept = PinnedAction(satellite_id="warm-up", target_id=target, start=start)
     _plan(replace(crowd, pins=Pins(keep=(kept,))), Rule())
@@ -254,14 +254,14 @@ def _shortage() -> None:
     """Run the searches that small missions are settled without."""
     problem = _built(_over_the_globe())
     plan = Rule().solve(problem, Budget(), 0).plan
-    TurnSearch(problem, plan, problem.typical_worth, Budget(), 0).turn(1)
+    AlternatingSearch(problem, plan, problem.typical_worth, Budget(), 0).step(1)
     paths, nothing = EnergyPaths(problem), np.zeros(len(problem.target_ids))
     ascent_on_energy(problem, paths, nothing, 1, 0).improve(1, Budget().stop)
     on_board = DataPaths.of(with_objective(problem, Objective(collected_share=0.9)))
     assert on_board is not None
     on_board.gain(np.append(nothing, 0.0))
-    free = FreeSearch(Incumbent(replace(problem, use_resources=False), Budget(), 0.0), 0)
-    free.price()
+    free = AgilitySearch(Incumbent(replace(problem, use_resources=False), Budget(), 0.0), 0)
+    free.ascend()
     for _ in free.cut(1):
         pass
     Mcts(worthless="sunpoint").solve(problem, Budget(), 0)
@@ -276,7 +276,7 @@ def _late() -> None:
     nothing = np.zeros(len(late.target_ids))
     LatencyAscent(late, nothing).improve(1, 0.0, Budget().stop)
     num_contacts = np.count_nonzero(late.opportunities.kind == CONTACT)
-    queue_value(late, nothing, 1, contact_prices=np.zeros(num_contacts))
+    queue_value(late, nothing, 1, contact_multipliers=np.zeros(num_contacts))
 
 
 def _slow() -> None:

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from service.db import clock
 from service.db.rows import OrderRow, PlanActionRow, PlanEventRow, TargetCatalogRow
 from service.plans.target_lives import Lives, lives_of, plans_by_catalog
-from service.wire.places import TargetIn
+from service.wire.sites import TargetIn
 from service.wire.stored import from_store
 from service.wire.target_lives import TargetCollectOut, TargetState
 

@@ -16,13 +16,13 @@ from service.wire.pins import PinnedActionIn
 _PIN = re.compile(r"/pins/(keep|skip)/(\d+)")
 
 
-Places = Mapping[str, Sequence[str | None]]
+Sites = Mapping[str, Sequence[str | None]]
 """Where each pin of the changed scenario comes from; None for one of the scenario before."""
 
 
 def places_of(
     pins: Pins, forbid: Sequence[PinnedAction], force: Sequence[PinnedAction], num_dropped: int
-) -> Places:
+) -> Sites:
     """Return those of ``reasons.what_if``: the new ones follow those there were."""
     skipped = [f"/forbid/{i}" for i, one in enumerate(forbid) if not is_any_image(one)]
     dropped = [f"/relax/drop_actions/{i}" for i in range(num_dropped)]
@@ -32,7 +32,7 @@ def places_of(
     }
 
 
-def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Places:
+def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Sites:
     """Return those of all that the body itself names."""
     return {
         "keep": [f"/force/{i}" for i in range(len(force))],
@@ -41,7 +41,7 @@ def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]
 
 
 @contextmanager
-def pointing_into(change: ChangeIn, places: Places) -> Iterator[None]:
+def pointing_into(change: ChangeIn, places: Sites) -> Iterator[None]:
     """Let faults of pins point into the change."""
 
     def place(pin: re.Match[str]) -> str | None:

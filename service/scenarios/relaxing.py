@@ -10,8 +10,8 @@ from service.problems.faults import pointer_to
 from service.scenarios.translate import read_file, scenario_from_file
 from service.wire.changes import PART_OF, RelaxIn
 from service.wire.instants import instant_text
-from service.wire.places import TargetIn
 from service.wire.scenarios import ScenarioFile
+from service.wire.sites import TargetIn
 
 _OF_TARGETS = TargetIn.model_fields.keys() - {"id", "name", "lat_deg", "lon_deg", "alt_m"}
 

@@ -33,7 +33,6 @@ from service.problems.faults import faults_of_validation
 from service.scenarios.forecast_inputs import forecast_from
 from service.scenarios.pin_inputs import outage_from, pins_from, replan_from, state_from
 from service.wire.base import fields_of
-from service.wire.places import GroundStationIn, TargetIn
 from service.wire.satellites import (
     OrbitIn,
     Preset,
@@ -49,6 +48,7 @@ from service.wire.scenarios import (
     QualityIn,
     ScenarioFile,
 )
+from service.wire.sites import GroundStationIn, TargetIn
 from service.wire.spacecraft import WholeSpacecraft
 
 B = TypeVar("B")

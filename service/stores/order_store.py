@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from service.db.rows import OrderRow, TargetCatalogRow, TargetRow
 from service.db.session import take_turns
-from service.wire.places import MAX_TARGETS
+from service.wire.sites import MAX_TARGETS
 
 CATALOG_NAME: Final = "STAPI orders"
 _TURNS: Final = "stapi_orders"

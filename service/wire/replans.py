@@ -9,10 +9,10 @@ from pydantic import Field
 from service.wire.base import Body, Free, Id, Instant, Name, NonNegative, Open, Wire
 from service.wire.jobs import LimitsIn
 from service.wire.pins import OutageIn, PinnedActionIn, StateIn
-from service.wire.places import TargetIn
 from service.wire.plan_before import PromiseIn, StabilityIn
 from service.wire.plans import MAX_REPORTED, ExecutionIn, PlanActionOut
 from service.wire.scenarios import AnyObjective
+from service.wire.sites import TargetIn
 
 
 class ReplanIn(Body):

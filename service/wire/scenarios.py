@@ -11,9 +11,9 @@ from pydantic_core import CoreSchema
 
 from service.wire.base import Body, Duration, Fraction, Id, Instant, Knot, Name, Open, Stored, Wire
 from service.wire.pins import PinsIn, PlacedOutage, StateIn
-from service.wire.places import GroundStationIn, TargetIn
 from service.wire.plan_before import ReplanOfFile
 from service.wire.satellites import Nadir, WholeSatellite
+from service.wire.sites import GroundStationIn, TargetIn
 from service.wire.spacecraft_types import BuiltIn, filled_file_satellite
 
 Dynamics = Literal["physical", "paper"]

@@ -7,8 +7,8 @@ from typing import Literal
 from pydantic import Field
 
 from service.wire.base import Instant, Open, Wire
-from service.wire.places import TargetIn
 from service.wire.plans import Outcome
+from service.wire.sites import TargetIn
 
 TargetState = Literal["open", "planned", "collected", "delivered", "expired", "cancelled"]
 

@@ -71,10 +71,10 @@ def bodies(text: Any, number: Any) -> list[tuple[str, Document]]:
 
 def one_by_one(body: Any, bad: object, good: object) -> Iterator[Any]:
     """Yield the body for each place that holds a bad value, with good ones in the others."""
-    whole, num_places = json.dumps(body), json.dumps(body).count(json.dumps(bad))
-    for place in range(num_places):
+    whole, num_sites = json.dumps(body), json.dumps(body).count(json.dumps(bad))
+    for place in range(num_sites):
         parts = whole.split(json.dumps(bad))
-        signs = [json.dumps(bad if number == place else good) for number in range(num_places)]
+        signs = [json.dumps(bad if number == place else good) for number in range(num_sites)]
         yield json.loads(
             "".join(itertools.chain(*itertools.zip_longest(parts, signs, fillvalue="")))
         )

@@ -55,7 +55,7 @@ def test_without_bad_luck_it_flies_what_the_referee_says() -> None:
         problem.opportunities.kind[a.opportunity] == COLLECT for a in plan.actions
     )
     down = {
-        problem.target_ids[int(problem.opportunities.place[a.opportunity])]
+        problem.target_ids[int(problem.opportunities.site[a.opportunity])]
         for satellite in timeline.satellites
         for a in satellite.actions
         if a.opportunity is not None and a.mode == "collect" and a.delivered_s is not None
@@ -70,7 +70,7 @@ def test_what_finds_no_room_or_no_power_is_skipped_and_said() -> None:
     length = timedelta(seconds=30)
     images = [
         Command(start=START + i * length, end=START + (i + 1) * length, mode="collect",
-                place_id=f"t{i}")
+                site_id=f"t{i}")
         for i in range(400)
     ]  # fmt: skip
     flown.commands = tuple(images)

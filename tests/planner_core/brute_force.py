@@ -72,7 +72,7 @@ class _Most:
     def __init__(self, problem: Problem) -> None:
         table = problem.opportunities
         self._is_image: list[bool] = (table.kind == COLLECT).tolist()
-        self._place: list[int] = table.place.tolist()
+        self._site: list[int] = table.site.tolist()
         self._satellite: list[int] = table.satellite.tolist()
         # Of each image before each contact; last, of one that no contact follows.
         age_s = np.maximum(table.start_s[None, :] - table.end_s[:, None], 0.0)
@@ -91,7 +91,7 @@ class _Most:
         for row in reversed(rows):
             if self._is_image[row]:
                 worth = self._worth[row][contact.get(self._satellite[row], -1)]
-                target = self._place[row]
+                target = self._site[row]
                 best[target] = max(best.get(target, 0.0), worth)
             else:
                 contact[self._satellite[row]] = row

@@ -73,14 +73,14 @@ def flat_problem(
                 if spacing_s is not None:
                     starts = [*np.arange(open_s, last_s, spacing_s).round(3).tolist(), last_s]
                 tasks += [
-                    Task(kind=COLLECT, place=target, start_s=start_s, end_s=start_s + COLLECT_S,
+                    Task(kind=COLLECT, site=target, start_s=start_s, end_s=start_s + COLLECT_S,
                          satellite=satellite, access=len(accesses))
                     for start_s in starts
                 ]  # fmt: skip
                 accesses.append((open_s, end_s))
         for _ in range(num_contacts):
             start_s = round(float(rng.uniform(0.0, horizon_s - 100.0)), 3)
-            tasks.append(Task(kind=CONTACT, place=0, start_s=start_s, end_s=start_s + 90.0,
+            tasks.append(Task(kind=CONTACT, site=0, start_s=start_s, end_s=start_s + 90.0,
                               satellite=satellite))  # fmt: skip
     problem = make_problem(
         tasks,
@@ -112,9 +112,9 @@ def _seen(problem: Problem, pointing: Pointing, accesses: list[tuple[float, floa
     is_collect = table.kind == COLLECT
     for column, t_s in ((table.los_start, table.start_s), (table.los_end, table.end_s)):
         for index, path in enumerate(pointing.paths):
-            for kind, places in ((COLLECT, pointing.targets_m), (CONTACT, pointing.stations_m)):
+            for kind, sites in ((COLLECT, pointing.targets_m), (CONTACT, pointing.stations_m)):
                 own = np.flatnonzero((table.satellite == index) & (table.kind == kind))
-                column[own] = sights(path, places, table.place[own], t_s[own])
+                column[own] = sights(path, sites, table.site[own], t_s[own])
     number = np.where(is_collect, table.access - n, 0)
     for row in np.flatnonzero(is_collect):
         table.access_start_s[row], table.access_end_s[row] = accesses[number[row]]

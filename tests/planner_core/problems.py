@@ -44,7 +44,7 @@ class Task:
     """One opportunity of a hand-made problem."""
 
     kind: int
-    place: int
+    site: int
     start_s: float
     end_s: float
     satellite: int = 0
@@ -73,7 +73,7 @@ def make_problem(
     downlinks: Downlinks | None = None,
 ) -> Problem:
     """Return a problem whose lines of sight lie in a plane, at the tasks' angles."""
-    ordered = sorted(tasks, key=lambda t: (t.start_s, t.end_s, t.satellite, t.kind, t.place))
+    ordered = sorted(tasks, key=lambda t: (t.start_s, t.end_s, t.satellite, t.kind, t.site))
     n = len(ordered)
 
     def column(values: Sequence[float], length: int = n) -> Floats:
@@ -92,7 +92,7 @@ def make_problem(
     table = Opportunities(
         satellite=np.array([t.satellite for t in ordered], dtype=np.int32),
         kind=np.array([t.kind for t in ordered], dtype=np.int8),
-        place=np.array([t.place for t in ordered], dtype=np.int32),
+        site=np.array([t.site for t in ordered], dtype=np.int32),
         access=np.array(
             [i if t.access is None else n + t.access for i, t in enumerate(ordered)],
             dtype=np.int32,
@@ -117,7 +117,7 @@ def make_problem(
     reward = column(rewards if rewards is not None else [1.0] * num_targets, num_targets)
     quality = column([t.quality for t in ordered])
     worth = _worth(table, reward, quality)
-    seen = set(table.place[table.kind == COLLECT].tolist())
+    seen = set(table.site[table.kind == COLLECT].tolist())
     return Problem(
         horizon_s=horizon_s,
         use_resources=use_resources,
@@ -159,7 +159,7 @@ def with_rewards(problem: Problem, rewards: Sequence[float] | npt.NDArray[np.num
 def _worth(table: Opportunities, reward: Floats, quality: Floats) -> Floats:
     worth = np.zeros(len(table))
     collects = table.kind == COLLECT
-    worth[collects] = reward[table.place[collects]] * quality[collects]
+    worth[collects] = reward[table.site[collects]] * quality[collects]
     return worth
 
 
@@ -195,7 +195,7 @@ def random_problem(
         start_s = round(float(rng.uniform(0, span_s)), 3)
         task = Task(
             kind=COLLECT,
-            place=int(rng.integers(num_targets)),
+            site=int(rng.integers(num_targets)),
             satellite=int(rng.integers(num_satellites)),
             start_s=start_s,
             end_s=start_s + 30.0,
@@ -213,7 +213,7 @@ def random_problem(
         tasks.append(
             Task(
                 kind=CONTACT,
-                place=int(rng.integers(num_stations)) if num_stations > 1 else 0,
+                site=int(rng.integers(num_stations)) if num_stations > 1 else 0,
                 satellite=int(rng.integers(num_satellites)),
                 start_s=start_s,
                 end_s=start_s + round(float(rng.uniform(40, 140)), 3),

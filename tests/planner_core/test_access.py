@@ -21,7 +21,7 @@ from planner_core.domain import (
 )
 from planner_core.orbits.ephemeris import propagate
 from planner_core.orbits.mask import mask_elevation_deg
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from tests.examples import examples
 from tests.geometry import (
     Ground,
@@ -57,7 +57,7 @@ def accesses_of(
     span_h: float = 24.0,
 ) -> Accesses:
     path = propagate(satellite(elements, sensor=sensor), hours(span_h))
-    return find_accesses(path, Places.of(targets), Limits.of_targets(sensor, targets))
+    return find_accesses(path, Sites.of(targets), Limits.of_targets(sensor, targets))
 
 
 def within_limits(position: Floats, ground: Ground, sensor: Sensor) -> Bools:
@@ -78,7 +78,7 @@ def test_limits_hold_half_a_second_inside_and_fail_half_a_second_outside(nadir: 
     skyfield = SkyfieldPath(orbit(), hours(24))
     assert len(found) > 100
     for index, one in enumerate(targets):
-        own = found.place == index
+        own = found.site == index
         ground = Ground.at(one.lat_deg, one.lon_deg)
         long = found.end_s[own] - found.start_s[own] > 1.0
         start, end = found.start_s[own][long], found.end_s[own][long]
@@ -134,7 +134,7 @@ def test_no_window_is_missed_and_none_invented(
     )
     path = propagate(satellite(elements, sensor=sensor), hours(12))
     one = [target(lat, lon)]
-    found = find_accesses(path, Places.of(one), Limits.of_targets(sensor, one))
+    found = find_accesses(path, Sites.of(one), Limits.of_targets(sensor, one))
     ground = Ground.at(lat, lon)
     expected = [
         window
@@ -158,15 +158,15 @@ def test_grazing_passes_shorter_than_the_step_between_nodes_are_found() -> None:
     """A pass's top elevation, less a little, as the minimum leaves a window of seconds."""
     path = propagate(satellite(), hours(24))
     station = GroundStation(id="s", name="s", lat_deg=40.0, lon_deg=10.0, min_elevation_deg=0.0)
-    place = Places.of([station])
+    site = Sites.of([station])
     ground = Ground.at(40.0, 10.0)
-    passes = find_accesses(path, place, Limits.of_stations([station]))
+    passes = find_accesses(path, site, Limits.of_stations([station]))
     assert len(passes) >= 4
     for start, end in zip(passes.start_s, passes.end_s, strict=True):
         t = np.linspace(start, end, 20001)
         elevation = elevation_deg(path.state_itrf(t)[0], ground)
         grazing = replace(station, min_elevation_deg=float(elevation.max()) - 1e-4)
-        found = find_accesses(path, place, Limits.of_stations([grazing]))
+        found = find_accesses(path, site, Limits.of_stations([grazing]))
         inside = (found.start_s >= start) & (found.end_s <= end)
         assert inside.sum() == 1
         assert (found.end_s - found.start_s)[inside][0] < 30.0
@@ -191,7 +191,7 @@ def test_off_nadir_alone_never_sees_through_the_earth() -> None:
     found = accesses_of(targets, Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=90.0))
     path = propagate(satellite(), hours(24))
     for index, one in enumerate(targets):
-        own = found.place == index
+        own = found.site == index
         middle = 0.5 * (found.start_s[own] + found.end_s[own])
         position, _ = path.state_itrf(middle)
         assert (elevation_deg(position, Ground.at(one.lat_deg, one.lon_deg)) > 0.0).all()
@@ -210,7 +210,7 @@ def test_left_and_right_share_out_what_either_side_sees() -> None:
     for side, sign in (("left", 1.0), ("right", -1.0)):
         found = parts[side]
         position, velocity = path.state_itrf(0.5 * (found.start_s + found.end_s))
-        there = Places.of(targets).position_m[found.place]
+        there = Sites.of(targets).position_m[found.site]
         left_of_track = (np.cross(position, velocity) * (there - position)).sum(axis=1)
         assert (sign * left_of_track > 0.0).all()
 
@@ -234,8 +234,8 @@ def test_windows_are_whole_milliseconds_within_the_horizon_in_order() -> None:
     for instants in (found.start_s, found.end_s):
         assert (np.round(instants * 1000.0) / 1000.0 == instants).all()
     assert (found.end_s > found.start_s).all()
-    assert (np.diff(found.place) >= 0).all()
-    same = np.diff(found.place) == 0
+    assert (np.diff(found.site) >= 0).all()
+    same = np.diff(found.site) == 0
     assert (found.start_s[1:][same] > found.end_s[:-1][same]).all()
 
 
@@ -244,7 +244,7 @@ def test_windows_cut_by_the_horizon_say_so() -> None:
     whole = accesses_of(one, Sensor())
     middle_s = float(0.5 * (whole.start_s[0] + whole.end_s[0]))
     path = propagate(satellite(), hours(middle_s / 3600.0))
-    before = find_accesses(path, Places.of(one), Limits.of_targets(Sensor(), one))
+    before = find_accesses(path, Sites.of(one), Limits.of_targets(Sensor(), one))
     assert not whole.ends_cut[0]
     assert before.ends_cut.tolist() == [False] * (len(before) - 1) + [True]
     assert not before.starts_cut.any()
@@ -259,8 +259,8 @@ def test_a_geostationary_satellite_sees_a_place_all_day_or_never() -> None:
         GroundStation(id=str(i), name="", lat_deg=10.0, lon_deg=east)
         for i, east in enumerate([lon, lon - 180.0 if lon > 0 else lon + 180.0])
     ]
-    found = find_accesses(path, Places.of(stations), Limits.of_stations(stations))
-    assert found.place.tolist() == [0]
+    found = find_accesses(path, Sites.of(stations), Limits.of_stations(stations))
+    assert found.site.tolist() == [0]
     assert (found.start_s[0], found.end_s[0]) == (0.0, 86400.0)
     assert found.starts_cut[0]
     assert found.ends_cut[0]
@@ -270,7 +270,7 @@ def test_a_stopped_search_ends_early() -> None:
     targets = some_targets(30)
     path = propagate(satellite(), hours(24))
     limits = Limits.of_targets(Sensor(), targets)
-    stopped = find_accesses(path, Places.of(targets), limits, np.ones(1, dtype=np.uint8))
+    stopped = find_accesses(path, Sites.of(targets), limits, np.ones(1, dtype=np.uint8))
     assert len(stopped) == 0
 
 
@@ -290,19 +290,19 @@ def test_contacts_stand_above_the_azimuth_elevation_mask(
     station = GroundStation(
         id="s", name="s", lat_deg=78.2, lon_deg=15.4, min_elevation_deg=7.0, elevation_mask=mask
     )
-    place = Places.of([station])
+    site = Sites.of([station])
     ground = Ground.at(78.2, 15.4)
 
     def holds(t: Floats) -> Bools:
         position, _ = path.state_itrf(t)
         sight = position - ground.position_m
-        east, north = sight @ place.east[0], sight @ place.north[0]
+        east, north = sight @ site.east[0], sight @ site.north[0]
         azimuth = np.degrees(np.arctan2(east, north))
         floor = np.maximum(7.0, mask_elevation_deg(mask, azimuth))
         return np.asarray(elevation_deg(position, ground) >= floor)
 
     expected = np.array(windows_by_scan(holds, path.duration_s, 0.1))
-    found = find_accesses(path, place, Limits.of_stations([station]))
+    found = find_accesses(path, site, Limits.of_stations([station]))
     assert len(found) == len(expected) > 5
     assert np.abs(found.start_s - expected[:, 0]).max() < 0.002
     assert np.abs(found.end_s - expected[:, 1]).max() < 0.002

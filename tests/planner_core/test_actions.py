@@ -107,7 +107,7 @@ def test_the_next_action_is_the_first_that_the_definition_allows(
             is_contact = bool(track.is_contact[row])
             if track.blocked[row] or (next_must < m and not follows(track, row, next_must)):
                 return False
-            if unimaged_only and not is_contact and collected[track.place[row]]:
+            if unimaged_only and not is_contact and collected[track.site[row]]:
                 return False
             if use_resources and is_contact and recorder < contact_above:
                 is_spare = may_pass(problem, track, row, recorder)
@@ -168,7 +168,7 @@ def test_what_may_follow_a_task_is_the_same_when_it_is_remembered(
         expected: list[int] = []
         seen: set[int] = set()
         for b in range(cursor + 1, m):
-            is_open = not (unimaged_only and collected[track.place[b]])
+            is_open = not (unimaged_only and collected[track.site[b]])
             access = int(problem.opportunities.access[b])
             if is_open and access not in seen and follows(track, last, b):
                 seen.add(access)
@@ -186,9 +186,9 @@ CONTACT_SOLVERS: list[Solver] = [
 def test_a_contact_passes_while_the_recorder_has_room_until_the_next(solver: Solver) -> None:
     """The first contact stands in an image's way; there is a second one in good time."""
     tasks = [
-        Task(kind=CONTACT, place=0, start_s=90.0, end_s=150.0),
-        Task(kind=COLLECT, place=0, start_s=100.0, end_s=130.0),
-        Task(kind=CONTACT, place=0, start_s=200.0, end_s=260.0),
+        Task(kind=CONTACT, site=0, start_s=90.0, end_s=150.0),
+        Task(kind=COLLECT, site=0, start_s=100.0, end_s=130.0),
+        Task(kind=CONTACT, site=0, start_s=200.0, end_s=260.0),
     ]
     problem = make_problem(tasks, num_targets=1)
     patient = replace(solver, contact_above_fraction=0.45)  # type: ignore[type-var]
@@ -203,9 +203,9 @@ def test_the_last_contact_before_many_images_is_taken(solver: Solver) -> None:
     strong = replace(
         TIGHT, initial_recorder_fraction=0.2, collect_drain_per_s=1e-6, telemetry_per_s=0.0
     )
-    contact = Task(kind=CONTACT, place=0, start_s=20.0, end_s=80.0)
+    contact = Task(kind=CONTACT, site=0, start_s=20.0, end_s=80.0)
     images = [
-        Task(kind=COLLECT, place=i, start_s=100.0 + 200.0 * i, end_s=130.0 + 200.0 * i)
+        Task(kind=COLLECT, site=i, start_s=100.0 + 200.0 * i, end_s=130.0 + 200.0 * i)
         for i in range(3)
     ]
     problem = make_problem([contact, *images], num_targets=3, resources=strong)

@@ -1,4 +1,4 @@
-"""Prices of antennas that satellites want at the same time: bounds hold, and know of them."""
+"""Multipliers of antennas that satellites want at the same time: bounds hold, and know of them."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.mip.antenna_prices import antenna_prices
+from planner_core.certified.mip.antenna_multipliers import antenna_multipliers
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.bound import rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.resource_bound import resource_value, whole_worth
 from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.solver import Certified
-from planner_core.certified.strategies.resource_fleet import FleetPricing
+from planner_core.certified.strategies.resource_fleet import FleetAscent
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics, Objective, Resources
@@ -50,11 +50,11 @@ def crowded(seed: int, dynamics: Dynamics, objective: Objective, antennas: int =
 def shared_pass(num_satellites: int = 2, objective: Objective = _DELIVERED) -> Problem:
     """Return satellites with two images each and one pass at the same time."""
     tasks = [
-        Task(kind=CONTACT, place=0, satellite=s, start_s=800.0, end_s=900.0)
+        Task(kind=CONTACT, site=0, satellite=s, start_s=800.0, end_s=900.0)
         for s in range(num_satellites)
     ]
     tasks += [
-        Task(kind=COLLECT, place=2 * s + i, satellite=s, start_s=at_s, end_s=at_s + 30.0)
+        Task(kind=COLLECT, site=2 * s + i, satellite=s, start_s=at_s, end_s=at_s + 30.0)
         for s in range(num_satellites)
         for i, at_s in enumerate((100.0 + s, 400.0 + s))
     ]
@@ -90,7 +90,7 @@ def test_groups_say_what_the_referee_says_of_stations(seed: int, antennas: int) 
     half_life_s=st.sampled_from([None, 300.0]),
     antennas=st.integers(1, 2),
 )
-def test_no_plan_beats_any_prices_of_antennas(
+def test_no_plan_beats_any_multipliers_of_antennas(
     dynamics: Dynamics,
     seed: int,
     collected_share: float,
@@ -105,20 +105,20 @@ def test_no_plan_beats_any_prices_of_antennas(
     rng = np.random.default_rng(seed)
     num_contacts = int((problem.opportunities.kind == CONTACT).sum())
     for _ in range(2):
-        prices = rng.uniform(0.0, 1.0, len(problem.target_ids)) * problem.best_worth
+        multipliers = rng.uniform(0.0, 1.0, len(problem.target_ids)) * problem.best_worth
         antenna = rng.uniform(-0.5, 3.0, len(antenna_groups(problem)))
         if half_life_s is None:
             for unit in (1.0, 0.1):
-                assert resource_value(problem, prices, unit, antenna) >= best - 1e-9
+                assert resource_value(problem, multipliers, unit, antenna) >= best - 1e-9
         else:
             tolls = rng.uniform(0.0, 10.0, num_contacts)
-            assert latency_value(problem, prices, tolls, antenna) >= best - 1e-9
+            assert latency_value(problem, multipliers, tolls, antenna) >= best - 1e-9
 
 
-def test_prices_tell_that_one_of_two_satellites_is_served() -> None:
+def test_multipliers_tell_that_one_of_two_satellites_is_served() -> None:
     problem = shared_pass()
     assert best_reward(problem) == 2.0
-    search = PriceSearch(problem, 4.0, np.zeros(4), np.zeros(1, dtype=np.uint8))
+    search = ResourceAscent(problem, 4.0, np.zeros(4), np.zeros(1, dtype=np.uint8))
     search.step(2.0)
     assert search.value == pytest.approx(4.0)
     assert search.wants_antennas
@@ -127,20 +127,20 @@ def test_prices_tell_that_one_of_two_satellites_is_served() -> None:
         search.step(2.0)
     bound = search.bound()
     assert bound.value == pytest.approx(2.0)
-    assert bound.antenna_prices is not None
+    assert bound.antenna_multipliers is not None
     assert is_proven(problem, from_json(to_json(bound)))
-    assert not is_proven(problem, replace(bound, antenna_prices=None))
+    assert not is_proven(problem, replace(bound, antenna_multipliers=None))
 
 
 @pytest.mark.parametrize("collected_share", [0.0, 0.5])
 def test_contacts_pay_for_all_that_they_bring_down(collected_share: float) -> None:
     problem = shared_pass(2, Objective(collected_share=collected_share))
     everything = np.ones(len(problem.opportunities), dtype=np.bool_)
-    paid = antenna_prices(problem, relaxations(problem), [everything], Budget(), 0)
+    paid = antenna_multipliers(problem, relaxations(problem), [everything], Budget(), 0)
     assert paid is not None
     assert paid.of_groups == pytest.approx([2.0 * (1.0 - collected_share)])
     assert paid.share == pytest.approx(np.full(4, collected_share))
-    search = PriceSearch(problem, 4.0, np.zeros(4), np.zeros(1, dtype=np.uint8))
+    search = ResourceAscent(problem, 4.0, np.zeros(4), np.zeros(1, dtype=np.uint8))
     search.restart(paid.share, paid.of_groups)
     search.step(0.0)
     assert search.value == pytest.approx(best_reward(problem), rel=0.02)  # in whole units
@@ -149,8 +149,8 @@ def test_contacts_pay_for_all_that_they_bring_down(collected_share: float) -> No
 def test_a_contact_pays_for_no_more_than_was_recorded_before_it() -> None:
     problem = shared_pass()
     table = problem.opportunities
-    first = (table.kind == CONTACT) | (table.place % 2 == 0)
-    paid = antenna_prices(problem, relaxations(problem), [first], Budget(), 0)
+    first = (table.kind == CONTACT) | (table.site % 2 == 0)
+    paid = antenna_multipliers(problem, relaxations(problem), [first], Budget(), 0)
     assert paid is not None
     assert paid.of_groups == pytest.approx([1.0])
 
@@ -158,17 +158,17 @@ def test_a_contact_pays_for_no_more_than_was_recorded_before_it() -> None:
 def test_images_of_a_satellite_with_an_antenna_of_its_own_pay_nothing() -> None:
     """The third passes later. What it takes after that stays on board."""
     tasks = [
-        Task(kind=CONTACT, place=0, satellite=s, start_s=at_s, end_s=at_s + 100.0)
+        Task(kind=CONTACT, site=0, satellite=s, start_s=at_s, end_s=at_s + 100.0)
         for s, at_s in enumerate((800.0, 800.0, 1200.0))
     ]
     tasks += [
-        Task(kind=COLLECT, place=place, satellite=s, start_s=at_s, end_s=at_s + 30.0)
-        for place, (s, at_s) in enumerate([(0, 100.0), (1, 101.0), (2, 102.0), (2, 1500.0)])
+        Task(kind=COLLECT, site=site, satellite=s, start_s=at_s, end_s=at_s + 30.0)
+        for site, (s, at_s) in enumerate([(0, 100.0), (1, 101.0), (2, 102.0), (2, 1500.0)])
     ]
     problem = make_problem(tasks, num_targets=4, num_satellites=3, resources=ROOMY)
     problem = with_objective(problem, Objective(collected_share=0.5))
     everything = np.ones(len(problem.opportunities), dtype=np.bool_)
-    paid = antenna_prices(problem, relaxations(problem), [everything], Budget(), 0)
+    paid = antenna_multipliers(problem, relaxations(problem), [everything], Budget(), 0)
     assert paid is not None
     assert paid.share[:3] == pytest.approx([0.5, 0.5, 1.0])
     assert problem.best_worth[3] == 0.5  # no contact follows
@@ -177,10 +177,10 @@ def test_images_of_a_satellite_with_an_antenna_of_its_own_pay_nothing() -> None:
 def test_what_all_comes_down_pays_for_nothing() -> None:
     problem = shared_pass()
     alone = problem.opportunities.satellite == 0
-    assert antenna_prices(problem, relaxations(problem), [alone], Budget(), 0) is None
+    assert antenna_multipliers(problem, relaxations(problem), [alone], Budget(), 0) is None
     roomy = replace(problem, station_antennas=np.array([2], dtype=np.int32))
     everything = np.ones(len(problem.opportunities), dtype=np.bool_)
-    assert antenna_prices(roomy, relaxations(roomy), [everything], Budget(), 0) is None
+    assert antenna_multipliers(roomy, relaxations(roomy), [everything], Budget(), 0) is None
 
 
 @pytest.mark.parametrize("collected_share", [0.0, 0.5])
@@ -192,14 +192,14 @@ def test_a_fleet_over_one_station_is_bounded_by_what_it_brings_down(
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)
     search.offer(Plan.of(problem, np.setdiff1d(np.arange(18), contacts[1:])))
     with tuned(several=1):
-        pricing = FleetPricing(search)
-        while not pricing.is_settled:
-            pricing.turn()
+        ascent = FleetAscent(search)
+        while not ascent.is_settled:
+            ascent.step()
     bound = search.best.bound
     most = 12.0 * collected_share + 2.0 * (1.0 - collected_share)
     assert bound.value == pytest.approx(most, rel=0.02)  # in whole units
     assert is_proven(problem, bound)
-    assert bound.antenna_prices is not None
+    assert bound.antenna_multipliers is not None
 
 
 def _crowded_fleet(seed: int) -> Problem:
@@ -210,7 +210,7 @@ def _crowded_fleet(seed: int) -> Problem:
     return with_objective(problem, Objective.delivered())
 
 
-def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_prices() -> None:
+def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_multipliers() -> None:
     resources = replace(ROOMY, collect_fill_per_s=0.0037, downlink_per_s=0.0013)
     roughly, finely = list[float](), list[float]()
     for seed in range(8):
@@ -219,7 +219,7 @@ def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_prices() -> Non
             span_s=6000.0, resources=replace(resources, initial_recorder_fraction=0.0),
         )  # fmt: skip
         problem = with_objective(problem, Objective.delivered())
-        search = PriceSearch(problem, 8.0, np.zeros(100), np.zeros(1, dtype=np.uint8))
+        search = ResourceAscent(problem, 8.0, np.zeros(100), np.zeros(1, dtype=np.uint8))
         search.step(0.0)
         roughly.append(search.value)
         search.count_finely(Plan())
@@ -230,33 +230,33 @@ def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_prices() -> Non
     assert sum(finely) < 0.9 * sum(roughly)
 
 
-def test_prices_of_antennas_that_prove_nothing_are_given_up() -> None:
-    """The bound of the prices that a search ends with is no higher than at first."""
+def test_multipliers_of_antennas_that_prove_nothing_are_given_up() -> None:
+    """The bound of the multipliers that a search ends with is no higher than at first."""
     num_crowded = 0
     for seed in range(12):
         problem = _crowded_fleet(seed)
         search = ResourceSearch(Incumbent(problem, Budget(), 0.0), seed)
         with tuned(worth_a_step=1.0):
-            pricing = FleetPricing(search)
-            while pricing.prices is None:
-                pricing.turn()
+            ascent = FleetAscent(search)
+            while ascent.exact is None:
+                ascent.step()
             first = search.best.bound.value
-            while not pricing.is_settled:
-                pricing.turn()
-        num_crowded += pricing.prices.wants_antennas
-        assert not pricing.knows_antennas
-        assert rounded_bound(problem, pricing.prices.value, 0.0) <= first
+            while not ascent.is_settled:
+                ascent.step()
+        num_crowded += ascent.exact.wants_antennas
+        assert not ascent.knows_antennas
+        assert rounded_bound(problem, ascent.exact.value, 0.0) <= first
     assert num_crowded > 1
 
 
-def test_prices_tell_so_where_images_age() -> None:
+def test_multipliers_tell_so_where_images_age() -> None:
     problem = with_objective(shared_pass(), Objective(collected_share=0.0, half_life_s=3600.0))
     best = best_reward(problem)
     ascent = LatencyAscent(problem, np.zeros(4))
     ascent.improve(100, best, np.zeros(1, dtype=np.uint8))
     bound = ascent.bound()
     assert best <= bound.value < 1.3 * best
-    assert latency_value(problem, ascent.prices, ascent.contact_prices) > 1.5 * best
+    assert latency_value(problem, ascent.multipliers, ascent.contact_multipliers) > 1.5 * best
     assert is_proven(problem, from_json(to_json(bound)))
 
 
@@ -269,8 +269,8 @@ def test_with_two_antennas_nothing_is_crowded() -> None:
 def test_a_path_pays_for_its_contacts() -> None:
     """Three whole units for two images, less one for the contact that brings them down."""
     problem = shared_pass()
-    prices, antenna = np.full(4, 0.5), np.array([0.25])
-    worth = whole_worth(problem, prices, 0.25, antenna)
+    multipliers, antenna = np.full(4, 0.5), np.array([0.25])
+    worth = whole_worth(problem, multipliers, 0.25, antenna)
     stop = np.zeros(1, dtype=np.uint8)
     for one in relaxations(problem):
         most, path = one.most(worth, 0.25, 0, stop, keeps_path=True)
@@ -279,7 +279,7 @@ def test_a_path_pays_for_its_contacts() -> None:
         assert len(path) == 3
     assert paid_for_antennas(problem, antenna) == 0.25
     assert antenna_tolls(problem, antenna).sum() == 0.5
-    assert resource_value(problem, prices, 0.25, antenna) == pytest.approx(2.0 + 0.25 + 1.5)
+    assert resource_value(problem, multipliers, 0.25, antenna) == pytest.approx(2.0 + 0.25 + 1.5)
 
 
 def test_a_contact_that_costs_more_than_all_it_brings_down_is_not_taken() -> None:

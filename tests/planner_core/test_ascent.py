@@ -64,11 +64,13 @@ def test_no_plan_of_a_fleet_beats_them(
         num_collects=10, agility=Agility(slew_rate_deg_s=slew_rate_deg_s), max_turn_deg=25.0,
     )  # fmt: skip
     best = best_reward(problem)
-    value, prices = settled(problem, num_epochs)
+    value, multipliers = settled(problem, num_epochs)
     assert value >= best - 1e-9
-    proven, _ = lagrangian_value(problem, prices)
+    proven, _ = lagrangian_value(problem, multipliers)
     assert proven == pytest.approx(value)
-    bound = Bound(value=rounded_bound(problem, value, 0.0), proof="lagrangian", prices=prices)
+    bound = Bound(
+        value=rounded_bound(problem, value, 0.0), proof="lagrangian", multipliers=multipliers
+    )
     assert is_proven(problem, from_json(to_json(bound)))
     assert lagrangian_bound(problem, 0.0).value >= best - 1e-9
 
@@ -89,7 +91,7 @@ class PlainPaths(OneByOne):
         targets, at = [], self._ends[part]
         while at >= 0:
             if weight[at] > 0.0:
-                targets.append(self._network.place[at])
+                targets.append(self._network.site[at])
             at = previous[at]
         self._latest.replace(part, np.array(targets, dtype=np.int32), count)
 
@@ -97,7 +99,7 @@ class PlainPaths(OneByOne):
         return self._longest(multipliers)[2]
 
     def _longest(self, multipliers: Floats) -> tuple[Floats, Ints, float]:
-        weight = np.maximum(self._worth - multipliers[self._network.place], 0.0)
+        weight = np.maximum(self._worth - multipliers[self._network.site], 0.0)
         value, previous = np.empty(len(weight)), np.empty(len(weight), dtype=np.int32)
         gain = heaviest_paths(self._network, weight, value, previous, self._ends)
         return weight, previous, gain
@@ -128,7 +130,7 @@ def test_they_settle_near_the_best(num_satellites: int) -> None:
         assert value <= 1.003 * best_known(problem)
 
 
-def test_the_same_prices_come_out_again() -> None:
+def test_the_same_multipliers_come_out_again() -> None:
     problem = crowded(1, 4)
     first, again = (settled(problem, 40) for _ in range(2))
     assert first[0] == again[0]
@@ -138,6 +140,6 @@ def test_the_same_prices_come_out_again() -> None:
 def test_targets_without_access_cost_nothing() -> None:
     problem = crowded(2, 3)
     wider = replace(problem, target_ids=(*problem.target_ids, "far"))
-    value, prices = settled(wider, 40)
+    value, multipliers = settled(wider, 40)
     assert value == settled(problem, 40)[0]
-    assert prices[-1] == 0.0
+    assert multipliers[-1] == 0.0

@@ -174,7 +174,7 @@ def test_the_turn_takes_what_it_takes() -> None:
     look = (float(np.cos(np.pi / 3.0)), float(np.sin(np.pi / 3.0)), 0.0)
     for start_s, is_fine in ((65.0, True), (64.99, False)):
         problem = make_problem(
-            [Task(kind=0, place=0, start_s=start_s, end_s=start_s + 30.0)],
+            [Task(kind=0, site=0, start_s=start_s, end_s=start_s + 30.0)],
             num_targets=1,
             use_resources=False,
             agility=Agility(slew_rate_deg_s=1.0, settle_s=5.0),
@@ -205,7 +205,7 @@ _RATE_DEG_S = 0.1
 
 
 def _mission(horizon: Horizon, *states: State, **more: Any) -> Scenario:
-    places = np.random.default_rng(1).uniform((-70.0, -180.0), (70.0, 180.0), (300, 2)).tolist()
+    sites = np.random.default_rng(1).uniform((-70.0, -180.0), (70.0, 180.0), (300, 2)).tolist()
     own = satellite(orbit())
     agility = Agility(slew_rate_deg_s=_RATE_DEG_S)
     resources = replace(Resources.paper(5668.7), sun_pointing=more.pop("sun_pointing", "free"))
@@ -213,7 +213,7 @@ def _mission(horizon: Horizon, *states: State, **more: Any) -> Scenario:
         horizon=horizon,
         satellites=(replace(own, agility=agility, resources=resources),),
         targets=tuple(
-            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(places)
+            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(sites)
         ),
         ground_stations=(
             GroundStation(id="sv", name="sv", lat_deg=78.2, lon_deg=15.4),
@@ -228,10 +228,10 @@ def _built(scenario: Scenario) -> Problem:
     return build_problem(scenario, compute_opportunities(scenario, Budget()), Budget())
 
 
-def _independent_look(when: datetime, place: dict[str, float]) -> np.ndarray:
+def _independent_look(when: datetime, site: dict[str, float]) -> np.ndarray:
     document = {"omm": omm_from_elements(orbit())}
     record: Satrec = independent.record_of(document)
-    look = independent.line_of_sight(record, place, when)
+    look = independent.line_of_sight(record, site, when)
     return np.asarray(look / np.linalg.norm(look))
 
 
@@ -248,12 +248,12 @@ def test_what_is_tracked_is_found_as_others_find_it(before_s: float) -> None:
     room_s = table.start_s + before_s - angle_deg / _RATE_DEG_S
     clear = np.abs(room_s) > 1.0  # a hundredth of a degree takes a tenth of a second
     row = int(np.flatnonzero(table.kind == 1)[0])
-    place = ("sv", "tr")[int(table.place[row])]
+    site = ("sv", "tr")[int(table.site[row])]
     attitudes = [
         Attitude(station_id="sv"),
         Attitude(line_of_sight=tuple(float(x) for x in seen)),  # type: ignore[arg-type]
     ]
-    if place == "sv":
+    if site == "sv":
         attitudes.append(Attitude(opportunity_id=f"o{row}"))
     for attitude in attitudes:
         state = State(satellite_id=own, at=begin, attitude=attitude)

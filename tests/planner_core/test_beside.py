@@ -18,7 +18,7 @@ from tests.planner_core.problems import random_problem
 def excludes(problem: Problem, row: int, other: int, kept: list[int]) -> bool:
     """Return whether ``other`` cannot stand beside ``row`` where all of ``kept`` runs."""
     table = problem.opportunities
-    if table.kind[row] == table.kind[other] == COLLECT and table.place[row] == table.place[other]:
+    if table.kind[row] == table.kind[other] == COLLECT and table.site[row] == table.site[other]:
         return True
     if table.satellite[row] == table.satellite[other]:
         satellite = problem.satellites[int(table.satellite[row])]
@@ -32,7 +32,7 @@ def excludes(problem: Problem, row: int, other: int, kept: list[int]) -> bool:
             return True
     if table.kind[row] == COLLECT or table.kind[other] == COLLECT:
         return False
-    if table.place[row] != table.place[other]:
+    if table.site[row] != table.site[other]:
         return False
     from_s = max(table.start_s[row], table.start_s[other])
     to_s = min(table.end_s[row], table.end_s[other])
@@ -40,10 +40,10 @@ def excludes(problem: Problem, row: int, other: int, kept: list[int]) -> bool:
         one
         for one in kept
         if table.kind[one] != COLLECT
-        and table.place[one] == table.place[row]
+        and table.site[one] == table.site[row]
         and table.start_s[one] <= from_s < table.end_s[one] - 1e-6
     ]
-    antennas = int(problem.station_antennas[table.place[row]])
+    antennas = int(problem.station_antennas[table.site[row]])
     return bool(to_s > from_s + 1e-6) and len(busy) >= antennas
 
 

@@ -1,4 +1,4 @@
-"""The bound holds for every plan, whatever the prices."""
+"""The bound holds for every plan, whatever the multipliers."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def test_no_plan_beats_the_bound(
     assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
     rng = np.random.default_rng(seed)
     for _ in range(5):
-        prices = rng.uniform(-1.0, 10.0, len(problem.target_ids))
-        assert lagrangian_value(problem, prices)[0] >= best - 1e-9
+        multipliers = rng.uniform(-1.0, 10.0, len(problem.target_ids))
+        assert lagrangian_value(problem, multipliers)[0] >= best - 1e-9
 
 
 @examples(60)
@@ -58,23 +58,23 @@ def test_a_slow_satellite_may_turn_by_way_of_tasks_that_are_worth_nothing(seed: 
     problem = with_rewards(problem, rng.integers(0, 2, 4))
     best = best_reward(problem)
     assert lagrangian_bound(problem, reward=0.0).value >= best - 1e-9
-    for prices in (np.zeros(4), np.ones(4), rng.uniform(0.0, 1.0, 4)):
-        assert lagrangian_value(problem, prices)[0] >= best - 1e-9
+    for multipliers in (np.zeros(4), np.ones(4), rng.uniform(0.0, 1.0, 4)):
+        assert lagrangian_value(problem, multipliers)[0] >= best - 1e-9
 
 
 @examples(40)
 @given(seed=SEEDS)
-def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
+def test_the_stored_multipliers_prove_the_bound_again(seed: int) -> None:
     problem = random_problem(seed, num_collects=60, num_targets=20, use_resources=False)
     plan = ForwardSearch().solve(problem, Budget(), 0).plan
     reward = replay(problem, plan).reward
     bound = lagrangian_bound(problem, reward)
-    assert bound.prices is not None
-    proven, _ = lagrangian_value(problem, bound.prices)
+    assert bound.multipliers is not None
+    proven, _ = lagrangian_value(problem, bound.multipliers)
     assert reward <= bound.value <= proven + 1e-6
 
 
-def test_prices_tighten_the_bound_where_targets_would_be_taken_twice() -> None:
+def test_multipliers_tighten_the_bound_where_targets_would_be_taken_twice() -> None:
     problem = random_problem(3, num_collects=60, num_targets=8, use_resources=False)
     free, _ = lagrangian_value(problem, np.zeros(8))
     assert lagrangian_bound(problem, reward=0.0).value <= 8.0 < free
@@ -82,8 +82,8 @@ def test_prices_tighten_the_bound_where_targets_would_be_taken_twice() -> None:
 
 def test_the_bound_says_how_often_its_paths_take_each_target() -> None:
     tasks = [
-        Task(kind=COLLECT, place=place, start_s=200.0 * i, end_s=200.0 * i + 30.0)
-        for i, place in enumerate([0, 1, 0, 2])
+        Task(kind=COLLECT, site=site, start_s=200.0 * i, end_s=200.0 * i + 30.0)
+        for i, site in enumerate([0, 1, 0, 2])
     ]
     problem = make_problem(tasks, num_targets=4, use_resources=False, rewards=[1.0, 1.0, 0.0, 1.0])
     value, counts = lagrangian_value(problem, np.array([0.25, 0.5, 0.5, 0.5]))
@@ -110,7 +110,7 @@ def test_a_bound_is_what_new_images_earn_and_those_on_board() -> None:
 
 
 def _pass(start_s: float, end_s: float, access: int) -> Task:
-    return Task(kind=CONTACT, place=0, start_s=start_s, end_s=end_s, access=access)
+    return Task(kind=CONTACT, site=0, start_s=start_s, end_s=end_s, access=access)
 
 
 _CHARGED = {"initial_battery_fraction": 0.6}
@@ -154,7 +154,7 @@ def test_what_energy_and_downlink_add_up_to(
     }  # fmt: skip
     if "initial_recorder_fraction" not in changes:
         bare["collect_fill_per_s"] = 0.0
-    tasks = [Task(kind=COLLECT, place=i, start_s=35.0 * i, end_s=35.0 * i + 30) for i in range(20)]
+    tasks = [Task(kind=COLLECT, site=i, start_s=35.0 * i, end_s=35.0 * i + 30) for i in range(20)]
     problem = make_problem(
         [*tasks, *contacts], num_targets=20, rewards=[0.7] * 20,
         resources=Resources(**{**bare, **changes}),

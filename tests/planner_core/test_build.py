@@ -30,7 +30,7 @@ from planner_core.domain import (
 )
 from planner_core.errors import Cancelled, InvalidScenario, PropagationFailed
 from planner_core.orbits.checks import check_element_age, check_propagation, orbit_warnings
-from planner_core.orbits.places import View
+from planner_core.orbits.sites import View
 from planner_core.problem import (
     ACCESS_FOUND,
     ACCESS_TOO_SHORT,
@@ -119,8 +119,8 @@ def test_rows_are_in_the_order_of_the_plan_model(computed: ScenarioOpportunities
     table = computed.opportunities
     asked = scenario(satellites=two_satellites())
     ids = [
-        (asked.targets[place].id if kind == COLLECT else asked.ground_stations[place].id)
-        for kind, place in zip(table.kind, table.place, strict=True)
+        (asked.targets[site].id if kind == COLLECT else asked.ground_stations[site].id)
+        for kind, site in zip(table.kind, table.site, strict=True)
     ]
     keys = list(zip(table.start_s, table.end_s, table.satellite, table.kind, ids, strict=True))
     assert keys == sorted(keys)
@@ -139,14 +139,14 @@ def test_ties_are_ordered_by_place_id_as_text() -> None:
             )
         )
     )
-    places = tuple(Target(id=name, lat_deg=5.0, lon_deg=lon) for name in ("10", "9", "1", "a"))
+    sites = tuple(Target(id=name, lat_deg=5.0, lon_deg=lon) for name in ("10", "9", "1", "a"))
     asked = replace(
         scenario(span_h=1.0, satellites=(replace(fixed, sensor=Sensor(off_nadir_min_deg=0.0)),)),
-        targets=places,
+        targets=sites,
         use_resources=False,
     )
     table = compute_opportunities(asked, Budget()).opportunities
-    assert [places[i].id for i in table.place] == ["1", "10", "9", "a"]
+    assert [sites[i].id for i in table.site] == ["1", "10", "9", "a"]
 
 
 def test_tasks_lie_in_their_accesses_on_whole_milliseconds(
@@ -167,7 +167,7 @@ def test_an_access_number_belongs_to_one_access(computed: ScenarioOpportunities)
     table = computed.opportunities
     by_number: dict[int, tuple[int, ...]] = {}
     columns = zip(
-        table.access, table.satellite, table.kind, table.place, table.access_start_s, strict=True
+        table.access, table.satellite, table.kind, table.site, table.access_start_s, strict=True
     )
     for number, *rest in columns:
         assert by_number.setdefault(number, tuple(rest)) == tuple(rest)
@@ -180,10 +180,8 @@ def test_angles_agree_with_skyfield(computed: ScenarioOpportunities) -> None:
     rng = np.random.default_rng(1)
     paths = [SkyfieldPath(mean_elements(s.orbit), asked.horizon) for s in asked.satellites]
     for i in rng.choice(len(table), 60, replace=False):
-        place = (asked.targets if table.kind[i] == COLLECT else asked.ground_stations)[
-            table.place[i]
-        ]
-        ground = Ground.at(place.lat_deg, place.lon_deg)
+        site = (asked.targets if table.kind[i] == COLLECT else asked.ground_stations)[table.site[i]]
+        ground = Ground.at(site.lat_deg, site.lon_deg)
         middle = np.array([0.5 * (table.start_s[i] + table.end_s[i])])
         position = paths[table.satellite[i]].position_m(middle)
         assert table.elevation_deg[i] == pytest.approx(elevation_deg(position, ground)[0], abs=3e-3)
@@ -263,15 +261,13 @@ def test_a_problem_has_every_row_once_and_its_satellites_rows(
 def test_each_target_without_collects_has_its_reason() -> None:
     """Equatorial orbit, 490 km up: the horizon is 22 deg of latitude away."""
     low = satellite(orbit(inclination_deg=0.01))
-    places = {
+    sites = {
         "pole": Target(id="pole", lat_deg=90.0, lon_deg=0.0),
         "edge": Target(id="edge", lat_deg=20.0, lon_deg=0.0),
         "long": Target(id="long", lat_deg=3.0, lon_deg=0.0, collect_s=3000.0),
         "good": Target(id="good", lat_deg=3.0, lon_deg=0.0),
     }
-    asked = replace(
-        scenario(satellites=(low,)), targets=tuple(places.values()), use_resources=False
-    )
+    asked = replace(scenario(satellites=(low,)), targets=tuple(sites.values()), use_resources=False)
     found = compute_opportunities(asked, Budget())
     assert found.target_access.tolist() == [
         NEVER_VISIBLE,

@@ -153,7 +153,7 @@ def test_with_a_worth_of_each_collect_it_equals_brute_force(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_crowded_starts_are_planned_within_a_true_bound(seed: int) -> None:
-    """Too large to be closed: what the prices of passes prove checks out, whatever the plan."""
+    """Too large to be closed: the bound from multipliers of passes checks out for any plan."""
     problem = random_problem(
         seed, use_resources=False, num_collects=300, num_offers=8, num_targets=150, span_s=5000.0,
         has_rewards=seed == 2,
@@ -209,9 +209,9 @@ def test_a_certificate_that_claims_less_than_a_plan_earns_is_never_sound(
     cuts += [Cut(sets=(row,)) for row in rows if len(row)]
     steps = tuple(
         Multipliers(
-            prices=rng.uniform(0.0, 1.2, 4),
+            of_targets=rng.uniform(0.0, 1.2, 4),
             cuts=tuple(cuts),
-            cut_prices=tuple(rng.uniform(0.0, 0.8, len(cuts))),
+            of_cuts=tuple(rng.uniform(0.0, 0.8, len(cuts))),
         )
         for _ in range(4)
     )
@@ -222,10 +222,10 @@ def test_a_certificate_that_claims_less_than_a_plan_earns_is_never_sound(
 
 
 def test_sets_that_a_plan_may_take_two_of_prove_nothing() -> None:
-    tasks = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    tasks = [Task(kind=COLLECT, site=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
     problem = make_problem(tasks, num_targets=2, use_resources=False)
     wrong = Multipliers(
-        prices=np.zeros(2), cuts=(Cut(sets=(np.array([0, 1]),)),), cut_prices=(1.0,)
+        of_targets=np.zeros(2), cuts=(Cut(sets=(np.array([0, 1]),)),), of_cuts=(1.0,)
     )
     certificate = Certificate(amount=2.0, refutation=Refutation(steps=(wrong,)))
     assert not is_refuted(problem, certificate)
@@ -233,7 +233,7 @@ def test_sets_that_a_plan_may_take_two_of_prove_nothing() -> None:
 
 def _either_or() -> Problem:
     """Return two targets of which a plan images one: their collects overlap."""
-    tasks = [Task(kind=COLLECT, place=i, start_s=10.0 * i, end_s=10.0 * i + 30) for i in range(2)]
+    tasks = [Task(kind=COLLECT, site=i, start_s=10.0 * i, end_s=10.0 * i + 30) for i in range(2)]
     return make_problem(tasks, num_targets=2, use_resources=False)
 
 
@@ -243,24 +243,24 @@ def _refutes(amount: float, *steps: Multipliers, problem: Problem | None = None)
 
 
 def test_a_certificate_proves_what_is_above_its_bound_and_not_what_a_plan_earns() -> None:
-    free = Multipliers(prices=np.zeros(2))
+    free = Multipliers(of_targets=np.zeros(2))
     assert _refutes(1.00001, free)
     assert not _refutes(1.0, free)
     # Nearer than sums are exact nothing is proven.
     assert not _refutes(1.0 + 1e-10, free)
     assert not _refutes(1.00001), "no multipliers, no proof"
-    # At these prices each image leaves its target what it is worth.
-    assert not _refutes(1.5, Multipliers(prices=np.ones(2)))
+    # At these multipliers each image leaves its target what it is worth.
+    assert not _refutes(1.5, Multipliers(of_targets=np.ones(2)))
 
 
 def test_multipliers_below_zero_prove_nothing() -> None:
-    apart = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    apart = [Task(kind=COLLECT, site=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
     problem = make_problem(apart, num_targets=2, use_resources=False)
-    assert not _refutes(1.5, Multipliers(prices=np.array([-5.0, 0.0])), problem=problem)
+    assert not _refutes(1.5, Multipliers(of_targets=np.array([-5.0, 0.0])), problem=problem)
     cut = Cut(sets=(np.array([0]),))
-    below = Multipliers(prices=np.ones(2), cuts=(cut,), cut_prices=(-1.0,))
+    below = Multipliers(of_targets=np.ones(2), cuts=(cut,), of_cuts=(-1.0,))
     assert not _refutes(1.5, below, problem=problem)
-    assert _refutes(2.5, Multipliers(prices=np.ones(2)), problem=problem)
+    assert _refutes(2.5, Multipliers(of_targets=np.ones(2)), problem=problem)
 
 
 def test_a_cut_of_three_sets_takes_one_of_what_lies_in_two_of_them() -> None:
@@ -278,13 +278,13 @@ def test_cuts_of_an_even_number_of_sets_or_of_one_task_twice_prove_nothing(
     sets: list[list[int]],
 ) -> None:
     cut = Cut(sets=tuple(np.array(rows) for rows in sets))
-    assert not _refutes(1.5, Multipliers(prices=np.zeros(2), cuts=(cut,), cut_prices=(0.0,)))
+    assert not _refutes(1.5, Multipliers(of_targets=np.zeros(2), cuts=(cut,), of_cuts=(0.0,)))
     sound = Cut(sets=(np.array([0, 1]),))
-    assert _refutes(1.5, Multipliers(prices=np.zeros(2), cuts=(sound,), cut_prices=(0.5,)))
+    assert _refutes(1.5, Multipliers(of_targets=np.zeros(2), cuts=(sound,), of_cuts=(0.5,)))
 
 
 def test_a_branch_needs_both_of_its_sides() -> None:
-    free = Multipliers(prices=np.zeros(2))
+    free = Multipliers(of_targets=np.zeros(2))
     done, open_ = Refutation(steps=(free,)), Refutation(steps=())
     for taken, leaving in ((done, done), (done, open_), (open_, done)):
         refutation = Refutation(steps=(), branch=(0, taken, leaving))
@@ -293,17 +293,17 @@ def test_a_branch_needs_both_of_its_sides() -> None:
 
 
 def test_a_branch_takes_its_task_and_leaves_what_that_excludes() -> None:
-    free = Refutation(steps=(Multipliers(prices=np.zeros(2)),))
+    free = Refutation(steps=(Multipliers(of_targets=np.zeros(2)),))
     certificate = Certificate(amount=1.5, refutation=Refutation(steps=(), branch=(0, free, free)))
-    apart = [Task(kind=COLLECT, place=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
+    apart = [Task(kind=COLLECT, site=i, start_s=200.0 * i, end_s=200.0 * i + 30) for i in range(2)]
     problem = make_problem(apart, num_targets=2, use_resources=False)
     assert not is_refuted(problem, certificate), "a plan takes both"
-    rivals = [Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0, satellite=i) for i in range(2)]
+    rivals = [Task(kind=COLLECT, site=0, start_s=0.0, end_s=30.0, satellite=i) for i in range(2)]
     problem = make_problem(rivals, num_targets=2, num_satellites=2, use_resources=False)
     assert not is_refuted(problem, Certificate(amount=1.5, refutation=free))
     assert is_refuted(problem, certificate)
     either = Cut(sets=(np.array([0, 1]),))
-    priced = Multipliers(prices=np.zeros(2), cuts=(either,), cut_prices=(1.0,))
+    priced = Multipliers(of_targets=np.zeros(2), cuts=(either,), of_cuts=(1.0,))
     assert _refutes(1.5, priced, problem=problem), "a cut says the same as the branch"
 
 

@@ -68,7 +68,7 @@ def test_delivered_is_the_best_of_all_plans(
     num_satellites=st.integers(1, 2),
     has_quality=st.booleans(),
 )
-# The price of an antenna ran off until it fitted no 32 bits.
+# The multiplier of an antenna ran off until it fitted no 32 bits.
 @example(
     seed=503436, dynamics="physical", collected_share=0.9, half_life_s=None, num_satellites=2,
     has_quality=True,
@@ -314,9 +314,9 @@ def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(
 def with_second_images(problem: Problem, plan: Plan) -> Plan:
     """Return the plan with every further image of its targets that breaks nothing."""
     taken = {a.opportunity for a in plan.actions}
-    places = {int(problem.opportunities.place[row]) for row in taken}
+    sites = {int(problem.opportunities.site[row]) for row in taken}
     for row in np.flatnonzero(problem.opportunities.kind == COLLECT).tolist():
-        if row in taken or int(problem.opportunities.place[row]) not in places:
+        if row in taken or int(problem.opportunities.site[row]) not in sites:
             continue
         trial = Plan.of(problem, [*(a.opportunity for a in plan.actions), row])
         if replay(problem, trial).is_valid:
@@ -366,7 +366,7 @@ def test_reasons_replay_what_promises_most_and_no_more_than_allowed(
     collected_share=st.sampled_from([0.1, 0.5, 0.9]),
     num_satellites=st.integers(1, 2),
     has_quality=st.booleans(),
-    price=st.floats(0.0, 1.2),
+    multiplier=st.floats(0.0, 1.2),
 )
 def test_a_share_for_images_on_board_bounds_every_plan(
     dynamics: Literal["physical", "paper"],
@@ -374,14 +374,14 @@ def test_a_share_for_images_on_board_bounds_every_plan(
     collected_share: float,
     num_satellites: int,
     has_quality: bool,
-    price: float,
+    multiplier: float,
 ) -> None:
-    """What `certified` makes of such prices is held by the property of all objectives."""
+    """What `certified` makes of such multipliers is held by the property of all objectives."""
     problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     problem = with_objective(problem, Objective(collected_share=collected_share))
     best = best_reward(problem)
     for unit in (0.05, 0.25, 1.0):
-        assert resource_value(problem, price * problem.best_worth, unit) >= best - 1e-9
+        assert resource_value(problem, multiplier * problem.best_worth, unit) >= best - 1e-9
 
 
 def test_what_stays_on_board_lowers_the_bound() -> None:

@@ -50,9 +50,9 @@ def test_what_is_stored_proves_the_bound_again() -> None:
     assert solution.bound is not None
     assert solution.proven is not None
     assert solution.proven.proof == "dp"
-    assert solution.proven.prices is not None
+    assert solution.proven.multipliers is not None
     assert solution.proven.unit is not None
-    proven = resource_value(problem, solution.proven.prices, solution.proven.unit)
+    proven = resource_value(problem, solution.proven.multipliers, solution.proven.unit)
     assert solution.bound <= proven + 1e-6
     assert proven < solution.bound + 1.0
 

@@ -87,10 +87,10 @@ def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s:
         value[b] = weight[b] + max(earlier, default=0.0)
     chain = heaviest_chain(satellite, weight)
     assert weight[chain].sum() == pytest.approx(value[weight > 0.0].max(initial=0.0))
-    for tasks in (chain, chain_with_history(satellite, weight, satellite.place)):
+    for tasks in (chain, chain_with_history(satellite, weight, satellite.site)):
         assert (weight[tasks] > 0.0).all()
         assert all(allows(a, b) for a, b in itertools.pairwise(tasks))
-    assert len(set(satellite.place[tasks])) == len(tasks)
+    assert len(set(satellite.site[tasks])) == len(tasks)
 
 
 @examples(60)
@@ -100,7 +100,7 @@ def test_graph_finds_the_optimum_where_no_target_comes_twice(path: str, seed: in
     rng = np.random.default_rng(seed)
     starts_s = rng.uniform(0.0, 400.0, 9).round(3)
     tasks = [
-        Task(kind=COLLECT, place=i, start_s=float(s), end_s=float(s) + 30.0,
+        Task(kind=COLLECT, site=i, start_s=float(s), end_s=float(s) + 30.0,
              angle_deg=float(rng.uniform(-55.0, 55.0)))
         for i, s in enumerate(starts_s)
     ]  # fmt: skip

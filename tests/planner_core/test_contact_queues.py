@@ -20,7 +20,7 @@ from planner_core.certified.lns.queue_plans import (
     replanned_day,
     some_contacts,
 )
-from planner_core.certified.multipliers.queues import priced_by_queues
+from planner_core.certified.multipliers.queues import multipliers_by_queues
 from planner_core.certified.proofs import queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -58,7 +58,7 @@ def num_contacts(problem: Problem) -> int:
     has_quality=st.booleans(),
     per_collect=st.sampled_from([1, 3, 24]),
 )
-def test_no_plan_beats_any_prices(
+def test_no_plan_beats_any_multipliers(
     dynamics: Dynamics,
     seed: int,
     collected_share: float,
@@ -79,21 +79,21 @@ def test_no_plan_beats_any_prices(
     of_contacts = rng.uniform(0.0, 3.0, num_contacts(problem)) * (rng.random() < 0.7)
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)
     exact = contacts[rng.random(len(contacts)) < 0.5].tolist()
-    for prices in (free, some):
-        whole, _ = queue_value(problem, prices, per_collect, exact_contacts=exact)
+    for multipliers in (free, some):
+        whole, _ = queue_value(problem, multipliers, per_collect, exact_contacts=exact)
         assert whole >= best - 1e-9
         # Paths may be left out, as long as no plan is among them that is better.
         level = float(rng.uniform(0.5, 1.0)) * best
         value, found = queue_value(
             problem,
-            prices,
+            multipliers,
             per_collect,
-            contact_prices=of_contacts,
+            contact_multipliers=of_contacts,
             exact_contacts=exact,
             level=level,
         )
         assert best - 1e-9 <= value <= max(whole, level) + 1e-6
-        if num_satellites == 1 and prices is free and value > level + 1e-6:
+        if num_satellites == 1 and multipliers is free and value > level + 1e-6:
             assert len(found) > 0
 
 
@@ -107,10 +107,10 @@ def test_what_follows_a_contact_and_what_leads_to_it_add_up_to_a_whole_path(
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
     (one,) = latency_relaxations(problem)
     rng = np.random.default_rng(seed)
-    price = np.append(rng.uniform(0.0, 0.5, len(problem.target_ids)), 0.0)
+    multiplier = np.append(rng.uniform(0.0, 0.5, len(problem.target_ids)), 0.0)
     tolls = Tolls(rng.uniform(0.0, 1.0, len(one.contacts)), np.zeros(len(one.contacts)))
-    most, path, _ = one.most(price, tolls)
-    found = one.most_by_pairs(price, tolls)
+    most, path, _ = one.most(multiplier, tolls)
+    found = one.most_by_pairs(multiplier, tolls)
     assert found is not None
     pairs, _ = found
     assert pairs.max() == pytest.approx(most, abs=1e-9)
@@ -158,17 +158,20 @@ def test_images_that_a_contact_has_no_time_for_count_with_a_later_one(
     assert bool(np.mean(by_queues) < 0.99 * np.mean(without_promises)) == is_promise_of_use
 
 
-def test_queues_bound_plans_better_than_prices_of_contacts() -> None:
+def test_queues_bound_plans_better_than_multipliers_of_contacts() -> None:
     problem = random_problem(
         3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0, resources=TIGHT
     )
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
-    prices = np.zeros(len(problem.target_ids))
-    value, rows = queue_value(problem, prices, 12)
-    assert value < latency_value(problem, prices, np.zeros(6))
+    multipliers = np.zeros(len(problem.target_ids))
+    value, rows = queue_value(problem, multipliers, 12)
+    assert value < latency_value(problem, multipliers, np.zeros(6))
     assert np.any(problem.opportunities.kind[rows] == CONTACT)
     bound = Bound(
-        value=rounded_bound(problem, value, 0.0), proof="dp", prices=prices, queue_levels=12
+        value=rounded_bound(problem, value, 0.0),
+        proof="dp",
+        multipliers=multipliers,
+        queue_levels=12,
     )
     read = from_json(to_json(bound))
     assert read.queue_levels == 12
@@ -192,14 +195,18 @@ def test_contacts_whose_energy_is_not_rounded_lower_the_bound() -> None:
     rounded, lowered = list[float](), list[float]()
     for seed in range(12):
         problem = _crowded(seed, num_targets=90, num_collects=200)
-        prices = np.zeros(90)
-        value, rows = queue_value(problem, prices, 2)
+        multipliers = np.zeros(90)
+        value, rows = queue_value(problem, multipliers, 2)
         contacts = rows[problem.opportunities.kind[rows] == CONTACT].tolist()
-        lower, _ = queue_value(problem, prices, 2, exact_contacts=contacts)
+        lower, _ = queue_value(problem, multipliers, 2, exact_contacts=contacts)
         rounded.append(value)
         lowered.append(lower)
         bound = Bound(
-            value=lower, proof="dp", prices=prices, queue_levels=2, exact_contacts=tuple(contacts)
+            value=lower,
+            proof="dp",
+            multipliers=multipliers,
+            queue_levels=2,
+            exact_contacts=tuple(contacts),
         )
         read = from_json(to_json(bound))
         assert read.exact_contacts == bound.exact_contacts
@@ -215,18 +222,24 @@ def test_multipliers_that_suit_given_contacts_lower_the_bound_of_their_plans() -
         none = np.zeros(6)
         _, rows = queue_value(problem, none, 24)
         contacts = rows[problem.opportunities.kind[rows] == CONTACT].tolist()
-        prices = priced_by_queues(problem, contacts, none, 20, STOP)
-        assert np.all(prices >= 0.0)
+        multipliers = multipliers_by_queues(problem, contacts, none, 20, STOP)
+        assert np.all(multipliers >= 0.0)
         part = taking(problem, contacts)
         at_first.append(queue_value(part, none, 24)[0])
-        at_last.append(queue_value(part, prices, 24)[0])
-        assert replay(problem, _plan_with(problem, contacts, prices)).reward <= at_last[-1] + 1e-9
-        assert priced_by_queues(problem, contacts, none, 20, np.ones(1, dtype=np.uint8)) is none
+        at_last.append(queue_value(part, multipliers, 24)[0])
+        assert (
+            replay(problem, _plan_with(problem, contacts, multipliers)).reward <= at_last[-1] + 1e-9
+        )
+        assert (
+            multipliers_by_queues(problem, contacts, none, 20, np.ones(1, dtype=np.uint8)) is none
+        )
     assert sum(at_last) < 0.995 * sum(at_first)
 
 
-def _plan_with(problem: Problem, contacts: list[int], prices: Floats) -> Plan:
-    plan = plan_with_queues(taking(problem, contacts), prices, np.random.default_rng(0), STOP, 24)
+def _plan_with(problem: Problem, contacts: list[int], multipliers: Floats) -> Plan:
+    plan = plan_with_queues(
+        taking(problem, contacts), multipliers, np.random.default_rng(0), STOP, 24
+    )
     assert plan is not None
     return plan
 
@@ -240,8 +253,10 @@ def test_contacts_that_must_be_taken_cost_their_energy_and_no_more(
     problem = _problem(seed, "physical", 1, num_contacts=3)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[:1].tolist()
-    prices = np.zeros(len(problem.target_ids))
-    plan = plan_with_queues(taking(problem, contacts), prices, np.random.default_rng(seed), STOP, 2)
+    multipliers = np.zeros(len(problem.target_ids))
+    plan = plan_with_queues(
+        taking(problem, contacts), multipliers, np.random.default_rng(seed), STOP, 2
+    )
     if plan is not None and plan.actions:
         codes = {violation.code for violation in replay(problem, plan).violations}
         assert codes <= {"station_conflict"}

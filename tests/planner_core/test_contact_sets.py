@@ -1,4 +1,4 @@
-"""Programs with fixed contacts: true values, prices that prove them, and plans that keep them."""
+"""Programs with fixed contacts: their values, multipliers that prove them, plans that keep them."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_an_interior_point_leads_to_as_good_a_corner(
 
 @examples(20)
 @given(seed=SEEDS, dynamics=st.sampled_from(["physical", "paper"]))
-def test_prices_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics: Dynamics) -> None:
+def test_multipliers_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics: Dynamics) -> None:
     problem = random_problem(
         seed, dynamics=dynamics, num_collects=40, num_targets=20, num_contacts=0
     )
@@ -93,9 +93,9 @@ def test_prices_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics: Dyna
     relaxation = FixedContacts(problem, every, (), Budget(), 0).relaxation()
     corner = FixedContacts(problem, every, (), Budget(), 0).relaxed()
     assert relaxation.value == pytest.approx(corner, rel=0.02)
-    assert np.all((relaxation.prices >= 0.0) & (relaxation.prices <= problem.best_worth))
+    assert np.all((relaxation.multipliers >= 0.0) & (relaxation.multipliers <= problem.best_worth))
     # Without contacts the programme over paths is no weaker than the linear one.
-    proven = resource_value(problem, relaxation.prices, 1e-3)
+    proven = resource_value(problem, relaxation.multipliers, 1e-3)
     assert proven <= relaxation.value + 0.05
     assert np.all(np.isfinite(relaxation.losses))
 

@@ -71,7 +71,7 @@ def best_reward(problem: Problem) -> float:
         nonlocal best
         best = max(best, float(sum(reward[target] for target in taken)))
         for task in range(len(spans.row)):
-            target = int(spans.place[task])
+            target = int(spans.site[task])
             if target in taken:
                 continue
             then_s = spans.open_s[task]
@@ -112,7 +112,7 @@ def test_plans_are_valid_no_worse_than_they_began_and_below_the_bound(
     seed=SEEDS, rate=st.sampled_from([1.0, 2.0]), settle_s=st.sampled_from([0.0, 6.0]),
     has_rewards=st.booleans(), width_s=st.sampled_from([2.5, 7.0, 25.0]),
 )  # fmt: skip
-def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
+def test_whatever_the_multipliers_the_bound_is_not_below_the_best_plan(
     seed: int, rate: float, settle_s: float, has_rewards: bool, width_s: float
 ) -> None:
     agility = Agility(slew_rate_deg_s=rate, settle_s=settle_s)
@@ -124,8 +124,8 @@ def test_whatever_the_prices_the_bound_is_not_below_the_best_plan(
     assert dual is not None
     rng = np.random.default_rng(seed)
     for share in (0.0, 0.3, 1.0):
-        prices = problem.best_worth * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
-        assert dual.at(prices)[0] >= best - 1e-9
+        multipliers = problem.best_worth * np.clip(rng.normal(share, 0.3, 6), 0.0, 1.0)
+        assert dual.at(multipliers)[0] >= best - 1e-9
     solution = planned(problem, Budget(), 0, 20.0)
     reward = replay(problem, solution.plan).reward
     assert reward <= best + 1e-9
@@ -190,7 +190,7 @@ def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
     assert proofs.is_proven(problem, again)
     assert not proofs.is_proven(problem, replace(again, value=bound.value - 1.0))
     every = accessible(problem)
-    assert every.value == len(np.unique(problem.opportunities.place))
+    assert every.value == len(np.unique(problem.opportunities.site))
     assert proofs.is_proven(problem, every)
 
 

@@ -79,7 +79,7 @@ def test_each_target_left_out_has_a_reason_true_of_free_starts(judged: Judged) -
     for outcome in left[:5]:
         assert outcome.reason is not None
         assert outcome.reason.opportunity is not None
-        assert problem.opportunities.place[outcome.reason.opportunity] == outcome.target
+        assert problem.opportunities.site[outcome.reason.opportunity] == outcome.target
         found = explain_target(problem, plan, judged.timeline, outcome.target)
         assert found.outcome.reason is not None
         assert found.outcome.reason.code == outcome.reason.code
@@ -107,7 +107,7 @@ def test_an_action_with_its_own_start_can_be_kept(judged: Judged) -> None:
     actions = [judged.solution.plan.actions[p] for p in own_starts(judged)][:25]
     keep = tuple(
         PinnedAction(
-            target_id=problem.target_ids[table.place[a.opportunity]],
+            target_id=problem.target_ids[table.site[a.opportunity]],
             satellite_id=problem.satellites[table.satellite[a.opportunity]].id,
             start=horizon.instant(a.start_s),
         )
@@ -115,9 +115,9 @@ def test_an_action_with_its_own_start_can_be_kept(judged: Judged) -> None:
     )
     again = pinned(judged, Pins(keep=keep))
     assert again.timeline.is_valid
-    place = again.problem.opportunities.place
-    held = {(int(place[a.opportunity]), a.start_s) for a in again.solution.plan.actions}
-    assert {(int(table.place[a.opportunity]), a.start_s) for a in actions} <= held
+    site = again.problem.opportunities.site
+    held = {(int(site[a.opportunity]), a.start_s) for a in again.solution.plan.actions}
+    assert {(int(table.site[a.opportunity]), a.start_s) for a in actions} <= held
     # Beside them at least what the plan had fits again.
     assert again.timeline.reward >= judged.timeline.reward - 2.0
     moved = replace(
@@ -135,7 +135,7 @@ def test_an_action_with_its_own_start_can_be_kept(judged: Judged) -> None:
 def test_a_kept_start_lies_in_its_access(judged: Judged) -> None:
     table, horizon = judged.problem.opportunities, judged.scenario.horizon
     row = 20
-    name = judged.problem.target_ids[table.place[row]]
+    name = judged.problem.target_ids[table.site[row]]
     late = horizon.instant(float(table.access_end_s[row]) - 10.0)
     again = pinned(judged, Pins(keep=(PinnedAction(target_id=name, start=late),)))
     (kept,) = again.problem.kept_rows
@@ -154,7 +154,7 @@ def test_skipping_an_image_skips_its_access_and_blocking_leaves_what_is_around(
     action = judged.solution.plan.actions[own_starts(judged)[5]]
     access = int(table.access[action.opportunity])
     skip = PinnedAction(
-        target_id=problem.target_ids[table.place[action.opportunity]],
+        target_id=problem.target_ids[table.site[action.opportunity]],
         satellite_id=problem.satellites[table.satellite[action.opportunity]].id,
         start=horizon.instant(action.start_s),
     )

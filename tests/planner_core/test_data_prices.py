@@ -105,7 +105,7 @@ def test_where_few_images_come_down_the_bound_knows_by_them(
 
     def bound_of(problem: Problem) -> float:
         search = ResourceSearch(Incumbent(problem, Budget(), 0.0), 0)
-        search.price(search.price_search, 1)
+        search.ascend(search.resource_ascent, 1)
         return search.best.bound.value
 
     resources = replace(

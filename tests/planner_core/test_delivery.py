@@ -34,11 +34,11 @@ ROOMY = Resources(
 
 
 def collect(target: int, start_s: float, quality: float = 1.0) -> Task:
-    return Task(kind=COLLECT, place=target, start_s=start_s, end_s=start_s + 30.0, quality=quality)
+    return Task(kind=COLLECT, site=target, start_s=start_s, end_s=start_s + 30.0, quality=quality)
 
 
 def contact(start_s: float, end_s: float) -> Task:
-    return Task(kind=CONTACT, place=0, start_s=start_s, end_s=end_s)
+    return Task(kind=CONTACT, site=0, start_s=start_s, end_s=end_s)
 
 
 def all_of(problem: Problem) -> Timeline:

@@ -26,7 +26,7 @@ from planner_core.errors import InvalidScenario
 from planner_core.mdp.resource_columns import STRICT, take
 from planner_core.mdp.track import NO_TASK, compile_track
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places, azimuth_elevation_deg
+from planner_core.orbits.sites import Sites, azimuth_elevation_deg
 from planner_core.pins import PinnedAction, Pins
 from planner_core.problem import (
     COLLECT,
@@ -82,7 +82,7 @@ def passes_problem(seed: int, dynamics: Dynamics = "physical") -> Problem:
     for _ in range(7):
         start_s = round(float(rng.uniform(0, 940)), 3)
         tasks.append(
-            Task(kind=COLLECT, place=int(rng.integers(5)), start_s=start_s, end_s=start_s + 30.0,
+            Task(kind=COLLECT, site=int(rng.integers(5)), start_s=start_s, end_s=start_s + 30.0,
                  angle_deg=float(rng.uniform(-55, 55)))
         )  # fmt: skip
     rates = []
@@ -94,7 +94,7 @@ def passes_problem(seed: int, dynamics: Dynamics = "physical") -> Problem:
         for cut in (0.0, 0.15, 0.3):
             begin_s, end_s = (round(start_s + part * length_s, 3) for part in (cut, 1.0 - cut))
             tasks.append(
-                Task(kind=CONTACT, place=number % 2, start_s=begin_s, end_s=end_s,
+                Task(kind=CONTACT, site=number % 2, start_s=begin_s, end_s=end_s,
                      angle_deg=float(rng.uniform(-60, 60)), access=number)
             )  # fmt: skip
     links = StationLinks(gain=rng.uniform(0.5, 2.0, 2), setup_s=rng.choice([0.0, 12.0, 25.0], 2))
@@ -197,8 +197,8 @@ def test_parts_of_many_passes_are_those_of_each(
     rates = [_drawn_rate(rng) for _ in range(rng.integers(0, 8))]
     ends_s = np.array([(rate.time_s[0], rate.time_s[-1]) for rate in rates]).reshape(-1, 2)
     nothing = np.zeros(len(rates), dtype=np.bool_)
-    place = rng.integers(0, 2, len(rates)).astype(np.int32)
-    accesses = Accesses(place=place, start_s=ends_s[:, 0], end_s=ends_s[:, 1],
+    site = rng.integers(0, 2, len(rates)).astype(np.int32)
+    accesses = Accesses(site=site, start_s=ends_s[:, 0], end_s=ends_s[:, 1],
                         starts_cut=nothing, ends_cut=nothing)  # fmt: skip
     top_s = rng.uniform(ends_s[:, 0], ends_s[:, 1])
     passes = Passes(PassRates.joined(rates), top_s)
@@ -206,7 +206,7 @@ def test_parts_of_many_passes_are_those_of_each(
     wanted = set[tuple[int, int, int, bool]]()
     whole = {int(row) for row, _, _ in zip(*placed.placed, strict=True)}
     for row in whole:
-        station = stations[place[row]]
+        station = stations[site[row]]
         spans = [(*(round(s * 1000) for s in ends_s[row].tolist()), False)]
         parts = [_part_ms(rates[row], top_s[row], station.setup_s, s) for s in (0.3, 0.6)]
         halves = _halves_ms(rates[row], station.setup_s)
@@ -222,22 +222,20 @@ def test_parts_of_many_passes_are_those_of_each(
 def test_passes_of_a_satellite_are_sampled_as_each_alone() -> None:
     scenario = _mission()
     path = propagate(scenario.satellites[0], scenario.horizon)
-    places = Places.of(scenario.ground_stations)
+    sites = Sites.of(scenario.ground_stations)
     table = compute_opportunities(scenario, Budget()).opportunities
     rows = np.flatnonzero(table.kind == CONTACT)
     nothing = np.zeros(len(rows), dtype=np.bool_)
-    accesses = Accesses(place=table.place[rows], start_s=table.access_start_s[rows],
+    accesses = Accesses(site=table.site[rows], start_s=table.access_start_s[rows],
                         end_s=table.access_end_s[rows], starts_cut=nothing,
                         ends_cut=nothing)  # fmt: skip
-    passes = passes_of(BY_ELEVATION, scenario.ground_stations, path, places, accesses)
+    passes = passes_of(BY_ELEVATION, scenario.ground_stations, path, sites, accesses)
     assert len(rows) > 0
     for row, rate in enumerate(passes.rates.each()):
-        station = int(accesses.place[row])
+        station = int(accesses.site[row])
         start_s, end_s = accesses.start_s[row], accesses.end_s[row]
         time_s = np.linspace(start_s, end_s, max(2, math.ceil((end_s - start_s) / 4.0) + 1))
-        _, height_deg = azimuth_elevation_deg(
-            path, places.at(np.full(len(time_s), station)), time_s
-        )
+        _, height_deg = azimuth_elevation_deg(path, sites.at(np.full(len(time_s), station)), time_s)
         gain = scenario.ground_stations[station].downlink_gain
         assert (rate.time_s == time_s).all()
         assert (rate.per_s == gain * BY_ELEVATION.downlink_at(height_deg)).all()
@@ -343,7 +341,7 @@ def test_exact_solvers_find_the_best_plan(
 
 
 def test_nothing_comes_down_during_setup() -> None:
-    contact = Task(kind=CONTACT, place=0, start_s=100.0, end_s=200.0)
+    contact = Task(kind=CONTACT, site=0, start_s=100.0, end_s=200.0)
     links = StationLinks(gain=np.array([0.5]), setup_s=np.array([60.0]))
     full = replace(TIGHT, initial_recorder_fraction=0.4, telemetry_per_s=0.0)
     problem = make_problem(
@@ -367,7 +365,7 @@ def test_volumes_follow_the_elevation_that_another_library_sees() -> None:
     assert len(contacts) > 6
     path = SkyfieldPath(mean_elements(scenario.satellites[0].orbit), scenario.horizon)
     for row in contacts.tolist():
-        station = scenario.ground_stations[int(table.place[row])]
+        station = scenario.ground_stations[int(table.site[row])]
         begin_s = float(table.start_s[row]) + station.setup_s
         steps_s = np.linspace(begin_s, float(table.end_s[row]), 201)
         ground = Ground.at(station.lat_deg, station.lon_deg)
@@ -424,7 +422,7 @@ def test_passes_that_two_satellites_want_at_a_time_are_offered_in_halves(
     for index, one in enumerate(problem.satellites):
         for access in np.unique(table.access[one.rows[one.kind == CONTACT]]):
             rows = np.flatnonzero(table.access == access)
-            others = (table.place == table.place[rows[0]]) & (table.satellite != index)
+            others = (table.site == table.site[rows[0]]) & (table.satellite != index)
             others &= (table.kind == CONTACT) & (table.access_start_s < table.access_end_s[rows[0]])
             is_shared = bool((others & (table.access_end_s > table.access_start_s[rows[0]])).any())
             halves = [
@@ -435,7 +433,7 @@ def test_passes_that_two_satellites_want_at_a_time_are_offered_in_halves(
             ]  # fmt: skip
             num_shared += is_shared
             # Once a station that needs setup is set up there may be no time for a half.
-            assert len(halves) == 2 * is_shared or (is_shared and table.place[rows[0]] == 1)
+            assert len(halves) == 2 * is_shared or (is_shared and table.site[rows[0]] == 1)
             volume = one.volume[problem.local_row[rows]]
             for row in halves:
                 share = one.volume[problem.local_row[row]] / volume.max()
@@ -461,7 +459,7 @@ def test_a_booking_in_whole_seconds_tells_a_pass_from_its_first_half() -> None:
     for row in (half, whole):
         named = PinnedAction(
             satellite_id=scenario.satellites[int(table.satellite[row])].id,
-            station_id=scenario.ground_stations[int(table.place[row])].id,
+            station_id=scenario.ground_stations[int(table.site[row])].id,
             start=scenario.horizon.instant(float(np.round(table.start_s[row]))),
         )
         kept = _built(replace(scenario, pins=Pins(keep=(named,))))
@@ -478,7 +476,7 @@ def test_two_satellites_share_a_pass() -> None:
     first = next(r for r in contacts if table.start_s[r] == table.access_start_s[r] + 2.0)
     later = next(
         r for r in contacts
-        if table.satellite[r] != table.satellite[first] and table.place[r] == table.place[first]
+        if table.satellite[r] != table.satellite[first] and table.site[r] == table.site[first]
         and table.access_start_s[r] < table.access_end_s[first] < table.access_end_s[r] + 600.0
         and table.start_s[r] >= table.end_s[first]
     )  # fmt: skip
@@ -502,7 +500,7 @@ def test_a_pin_on_a_pass_means_all_of_it() -> None:
     scenario = _mission()
     table = _built(scenario).opportunities
     first = int(np.flatnonzero(table.kind == CONTACT)[0])
-    station = scenario.ground_stations[int(table.place[first])].id
+    station = scenario.ground_stations[int(table.site[first])].id
     then = scenario.horizon.instant(float(table.start_s[first]))
     named = PinnedAction(satellite_id=scenario.satellites[0].id, station_id=station, start=then)
     skipped = _built(replace(scenario, pins=Pins(skip=(named,)))).opportunities
@@ -518,7 +516,7 @@ def test_flows_are_empty_while_a_contact_is_set_up() -> None:
     for row in np.flatnonzero(problem.opportunities.kind == CONTACT).tolist():
         (action,) = Plan.of(problem, (row,)).actions
         pieces = flow(problem, problem.satellites[0], action)
-        setup_s = problem.downlinks.stations.setup_s[problem.opportunities.place[row]]
+        setup_s = problem.downlinks.stations.setup_s[problem.opportunities.site[row]]
         assert pieces[0, 0] == pytest.approx(action.start_s + setup_s)
         assert pieces[-1, 1] == action.end_s
 
@@ -541,7 +539,7 @@ def test_knots_ascend_and_are_magnitudes(knots: tuple[tuple[float, float], ...])
 
 
 def test_telemetry_may_fill_the_recorder_while_a_contact_is_set_up() -> None:
-    contact = Task(kind=CONTACT, place=0, start_s=10.0, end_s=110.0)
+    contact = Task(kind=CONTACT, site=0, start_s=10.0, end_s=110.0)
     for setup_s, is_within in ((20.0, True), (60.0, False)):
         nearly = replace(
             TIGHT,

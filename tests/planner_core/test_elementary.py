@@ -58,21 +58,23 @@ def spaced_problem(
     return replace(problem, horizon_s=span_s + 200.0)
 
 
-def random_prices(problem: Problem, rng: np.random.Generator) -> Floats:
-    prices: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.best_worth
-    return prices
+def random_multipliers(problem: Problem, rng: np.random.Generator) -> Floats:
+    multipliers: Floats = rng.uniform(-0.3, 1.2, len(problem.target_ids)) * problem.best_worth
+    return multipliers
 
 
 @examples(150)
 @given(seed=st.integers(0, 10**6))
-def test_whatever_the_prices_it_lies_between_the_optimum_and_the_plain_bound(seed: int) -> None:
+def test_whatever_the_multipliers_it_lies_between_the_optimum_and_the_plain_bound(
+    seed: int,
+) -> None:
     problem = spaced_problem(seed)
     rng = np.random.default_rng(seed)
     best = best_reward(problem)
     for _ in range(4):
-        prices = random_prices(problem, rng)
-        value, counts = elementary_value(problem, prices)
-        plain, _ = lagrangian_value(problem, prices)
+        multipliers = random_multipliers(problem, rng)
+        value, counts = elementary_value(problem, multipliers)
+        plain, _ = lagrangian_value(problem, multipliers)
         assert best - 1e-9 <= value <= plain + 1e-9
         assert counts.min() >= 0
 
@@ -85,9 +87,9 @@ def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
     reward = replay(problem, improved(problem, Plan(), 30.0, Budget(), seed)).reward
     rng = np.random.default_rng(seed)
     for _ in range(4):
-        prices = random_prices(problem, rng)
-        value, _ = elementary_value(problem, prices)
-        plain, _ = lagrangian_value(problem, prices)
+        multipliers = random_multipliers(problem, rng)
+        value, _ = elementary_value(problem, multipliers)
+        plain, _ = lagrangian_value(problem, multipliers)
         assert reward - 1e-9 <= value <= plain + 1e-9
 
 
@@ -117,7 +119,7 @@ def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
             value, last, seen = chains.pop()
             best = max(best, value)
             for row in range(last + 1, len(satellite)):
-                target = int(table.place[satellite.rows[row]])
+                target = int(table.site[satellite.rows[row]])
                 if last >= 0 and not satellite.transitions.allows(last, row):
                     continue
                 gained = 0.0 if target in seen else float(worth[satellite.rows[row]])
@@ -129,7 +131,7 @@ def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
 def test_a_target_in_view_for_long_is_paid_once() -> None:
     """Ten collects of one access, 30 s apart: the plain bound pays them all."""
     tasks = [
-        Task(kind=COLLECT, place=0, start_s=30.0 * k, end_s=30.0 * k + 30.0, access=0)
+        Task(kind=COLLECT, site=0, start_s=30.0 * k, end_s=30.0 * k + 30.0, access=0)
         for k in range(10)
     ]
     problem = make_problem(tasks, num_targets=1, use_resources=False)
@@ -138,7 +140,7 @@ def test_a_target_in_view_for_long_is_paid_once() -> None:
     assert lagrangian_value(problem, nothing)[0] == pytest.approx(10.0)
 
 
-def test_prices_get_better_and_their_proof_survives_being_written_down() -> None:
+def test_multipliers_get_better_and_their_proof_survives_being_written_down() -> None:
     problem = spaced_problem(5, num_accesses=60, num_offers=8, span_s=3000.0)
     first, again = (ascent_on_passes(problem, 0) for _ in range(2))
     first.improve(5, NEVER)
@@ -148,7 +150,7 @@ def test_prices_get_better_and_their_proof_survives_being_written_down() -> None
     assert first.value < before
     assert first.value == again.value
     proven = first.multipliers
-    bound = Bound(value=first.value, proof="lagrangian", prices=proven, is_elementary=True)
+    bound = Bound(value=first.value, proof="lagrangian", multipliers=proven, is_elementary=True)
     read = from_json(to_json(bound))
     assert is_proven(problem, read)
     assert not is_proven(problem, replace(read, value=first.value - 1.5))
@@ -166,7 +168,7 @@ def test_the_quick_bound_pays_a_target_once_in_each_pass() -> None:
 
 @pytest.mark.parametrize("seed", [0, 3, 12])
 def test_a_fleet_s_bound_pays_a_target_once_in_each_pass_too(seed: int) -> None:
-    """Below that of plain paths, from which a fleet's prices come."""
+    """Below that of plain paths, from which a fleet's multipliers come."""
     problem = spaced_problem(seed, num_accesses=60, num_offers=8, span_s=1000.0)
     assert sum(len(satellite) > 0 for satellite in problem.satellites) == 2
 

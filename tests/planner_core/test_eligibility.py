@@ -100,7 +100,7 @@ def allowed_rows(scenario: Scenario, whole: ScenarioOpportunities) -> np.ndarray
     table = whole.opportunities
     rows = []
     for row in range(len(table)):
-        target = scenario.targets[int(table.place[row])]
+        target = scenario.targets[int(table.site[row])]
         sensor = scenario.satellites[int(table.satellite[row])].sensor
         start, end = at(float(table.start_s[row])), at(float(table.end_s[row]))
         if (
@@ -119,7 +119,7 @@ def test_on_a_grid_exactly_the_collects_in_time_of_the_right_type_are_left(seed:
     asked = asking(scenario, seed)
     found = compute_opportunities(asked, Budget()).opportunities
     rows = allowed_rows(asked, whole)
-    for name in ("satellite", "place", "start_s", "end_s"):
+    for name in ("satellite", "site", "start_s", "end_s"):
         assert getattr(found, name).tolist() == getattr(whole.opportunities, name)[rows].tolist()
 
 
@@ -175,7 +175,7 @@ def test_the_referee_rejects_a_collect_outside_its_times() -> None:
     row = int(np.argmax(table.access_end_s - table.access_start_s))
     begin_s, end_s = float(table.access_start_s[row]), float(table.access_end_s[row])
     assert end_s - begin_s > 60.0
-    name = scenario.targets[int(table.place[row])].id
+    name = scenario.targets[int(table.site[row])].id
     times: dict[str, Any] = {"release": at(begin_s + 10.0), "due": at(end_s - 10.0)}
     asked = replace(
         free, targets=tuple(replace(t, **times) if t.id == name else t for t in free.targets)
@@ -185,7 +185,7 @@ def test_the_referee_rejects_a_collect_outside_its_times() -> None:
     (again,) = [
         i
         for i in range(len(own))
-        if own.place[i] == table.place[row]
+        if own.site[i] == table.site[row]
         and own.satellite[i] == table.satellite[row]
         and begin_s <= own.start_s[i] < end_s
     ]

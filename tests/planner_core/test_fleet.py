@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget, Termination
 from planner_core.certified.driver import Effort
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.lns.fleet_start import priced_start
+from planner_core.certified.lns.fleet_start import start_at_multipliers
 from planner_core.certified.lns.search import WindowSearch
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
@@ -46,7 +46,7 @@ def fleet(seed: int, slew_rate_deg_s: float = 1.0) -> Problem:
 def searched(problem: Problem, budget: Budget, seed: int) -> FleetSearch:
     """Return a search that has gone through all its steps."""
     search = FleetSearch(Incumbent(problem, budget, 0.0), seed)
-    search.price()
+    search.ascend()
     search.start()
     for _ in search.search(20.0):
         pass
@@ -127,7 +127,7 @@ def test_a_large_fleet_is_planned_in_one_stream() -> None:
     timeline = replay(problem, solution.plan)
     assert timeline.is_valid
     assert solution.proven is not None
-    assert solution.proven.prices is not None
+    assert solution.proven.multipliers is not None
     assert is_proven(problem, from_json(to_json(solution.proven)))
     assert timeline.reward <= solution.proven.value <= 1.1 * timeline.reward
 
@@ -135,19 +135,19 @@ def test_a_large_fleet_is_planned_in_one_stream() -> None:
 def test_a_large_fleet_searches_among_what_costs_the_bound_little() -> None:
     problem = fleet(4)
     search = FleetSearch(Incumbent(problem, Budget(), 0.0), 0)
-    search.price(80)
+    search.ascend(80)
     network = network_of(problem)
-    worth, price = problem.worth[network.row], np.append(search.prices, 0.0)[network.place]
+    worth, multiplier = problem.worth[network.row], np.append(search.multipliers, 0.0)[network.site]
     n = len(worth)
     ends = np.empty(len(network.first) - 1, dtype=np.int32)
 
     def bound(held: int | None) -> float:
         """Return what paths are worth of which one holds a task, whatever it costs."""
-        weight = np.maximum(worth - price, 0.0)
+        weight = np.maximum(worth - multiplier, 0.0)
         if held is not None:
             weight[held] = 1e6
         value = heaviest_paths(network, weight, np.empty(n), np.empty(n, dtype=np.int32), ends)
-        return value if held is None else value - 1e6 + worth[held] - price[held]
+        return value if held is None else value - 1e6 + worth[held] - multiplier[held]
 
     is_near = search.near_best()[network.row]
     expected = [bound(None) - bound(a) <= 0.2 * worth[a] + 1e-6 for a in range(n)]
@@ -155,7 +155,7 @@ def test_a_large_fleet_searches_among_what_costs_the_bound_little() -> None:
     assert 0 < np.count_nonzero(is_near) < n
 
 
-def test_prices_make_a_better_start() -> None:
+def test_multipliers_make_a_better_start() -> None:
     gained = 0.0
     for seed in range(10):
         problem = fleet(seed)
@@ -165,8 +165,8 @@ def test_prices_make_a_better_start() -> None:
         dual.improve(100, Budget().stop)
         nothing = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
         plans = [
-            Plan.of(problem, priced_start(network, worth, prices, nothing, 0))
-            for prices in (np.append(dual.multipliers, 0.0), np.zeros(len(nothing)))
+            Plan.of(problem, start_at_multipliers(network, worth, multipliers, nothing, 0))
+            for multipliers in (np.append(dual.multipliers, 0.0), np.zeros(len(nothing)))
         ]
         priced, plain = (replay(problem, plan) for plan in plans)
         assert priced.is_valid

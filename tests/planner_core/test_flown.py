@@ -65,12 +65,12 @@ KINDS: dict[str, dict[str, Any]] = {
 
 
 def mission(kind: str, **more: Any) -> Scenario:
-    places = np.random.default_rng(4).uniform((-70.0, -180.0), (70.0, 180.0), (250, 2)).tolist()
+    sites = np.random.default_rng(4).uniform((-70.0, -180.0), (70.0, 180.0), (250, 2)).tolist()
     values: dict[str, Any] = {
         "horizon": Horizon(start=BEGIN, end=END),
         "satellites": (replace(satellite(orbit()), **KINDS[kind]),),
         "targets": tuple(
-            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(places)
+            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(sites)
         ),
         "ground_stations": (
             GroundStation(id="sv", name="sv", lat_deg=78.2, lon_deg=15.4, setup_s=20.0),
@@ -105,13 +105,13 @@ def words(scenario: Scenario, problem: Problem, plan: Plan) -> list[Flown]:
     found = []
     for action in plan.actions:
         row = action.opportunity
-        place = int(problem.opportunities.place[row])
+        site = int(problem.opportunities.site[row])
         is_image = problem.opportunities.kind[row] == COLLECT
         found.append(
             Flown(
                 satellite_id=scenario.satellites[int(problem.opportunities.satellite[row])].id,
-                target_id=problem.target_ids[place] if is_image else None,
-                station_id=None if is_image else problem.station_ids[place],
+                target_id=problem.target_ids[site] if is_image else None,
+                station_id=None if is_image else problem.station_ids[site],
                 start=scenario.horizon.instant(action.start_s),
                 end=scenario.horizon.instant(action.end_s),
             )
@@ -249,7 +249,7 @@ def test_what_was_imaged_is_not_imaged_again_and_what_failed_is() -> None:
     problem = built(scenario)
     imaged = {problem.target_ids[one.target] for one in problem.on_board if one.target >= 0}
     assert imaged == {one.target_id for one in images} - {failed.target_id, skipped.target_id}
-    offered = {problem.target_ids[t] for t in problem.opportunities.place[
+    offered = {problem.target_ids[t] for t in problem.opportunities.site[
         problem.opportunities.kind == COLLECT]}  # fmt: skip
     assert not offered & imaged
 

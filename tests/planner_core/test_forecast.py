@@ -90,10 +90,10 @@ def test_collects_are_worth_reward_times_everything_that_lessens_it() -> None:
     table = problem.opportunities
     checked = 0
     for row in np.flatnonzero(table.kind == COLLECT).tolist():
-        target = targets[table.place[row]]
-        own = asked.forecast.series[table.place[row] % 2] if asked.forecast else None
+        target = targets[table.site[row]]
+        own = asked.forecast.series[table.site[row] % 2] if asked.forecast else None
         assert own is not None
-        values = own.clear_probability[np.flatnonzero(own.target == table.place[row])[0]]
+        values = own.clear_probability[np.flatnonzero(own.target == table.site[row])[0]]
         middle_s = (table.start_s[row] + table.end_s[row]) / 2
         worth = target.reward * np.interp(table.off_nadir_deg[row], [0, 45], [1, 0.5])
         worth *= np.interp(middle_s, own.time_s, values)

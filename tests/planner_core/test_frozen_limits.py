@@ -31,10 +31,10 @@ from tests.planner_core.verdicts import certified
 
 NEARLY_FULL = replace(TIGHT, initial_recorder_fraction=0.4, initial_battery_fraction=0.9)
 TASKS = [
-    Task(kind=COLLECT, place=0, start_s=50.0, end_s=80.0),
-    Task(kind=COLLECT, place=1, start_s=120.0, end_s=150.0),
-    Task(kind=CONTACT, place=0, start_s=200.0, end_s=300.0),
-    Task(kind=COLLECT, place=2, start_s=400.0, end_s=430.0),
+    Task(kind=COLLECT, site=0, start_s=50.0, end_s=80.0),
+    Task(kind=COLLECT, site=1, start_s=120.0, end_s=150.0),
+    Task(kind=CONTACT, site=0, start_s=200.0, end_s=300.0),
+    Task(kind=COLLECT, site=2, start_s=400.0, end_s=430.0),
 ]
 
 
@@ -119,8 +119,7 @@ def test_an_image_that_finds_no_energy_at_all_earns_nothing() -> None:
 
 def test_no_recorder_is_full_for_want_of_the_longest_contact_of_a_pass() -> None:
     passes = [
-        Task(kind=CONTACT, place=0, start_s=200.0, end_s=end_s, access=9)
-        for end_s in (220.0, 300.0)
+        Task(kind=CONTACT, site=0, start_s=200.0, end_s=end_s, access=9) for end_s in (220.0, 300.0)
     ]
     whole = make_problem([*TASKS[:2], *passes], num_targets=2, resources=NEARLY_FULL)
     problem = _after(whole, [0], 100.0)
@@ -143,7 +142,7 @@ def test_every_solver_goes_on_from_what_is_frozen(name: str) -> None:
 
 
 def test_a_promise_that_would_overfill_the_recorder_is_kept_later_or_refused() -> None:
-    later = Task(kind=COLLECT, place=1, start_s=500.0, end_s=530.0)
+    later = Task(kind=COLLECT, site=1, start_s=500.0, end_s=530.0)
     whole = make_problem([*TASKS, later], num_targets=3, resources=NEARLY_FULL)
     problem = _after(whole, [0], 100.0)
     found = replanned(_question(problem, [0, 1, 3], 1), within_limits(problem), Rule(), Budget(), 0)

@@ -11,7 +11,7 @@ from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.highs import Engine, Outcome
 from planner_core.certified.proofs.bound import Bound, is_optimal
-from planner_core.certified.strategies.agility import FreeSearch
+from planner_core.certified.strategies.agility import AgilitySearch
 from planner_core.certified.strategies.fleet import FleetSearch
 from planner_core.certified.tolerances import SAME
 from planner_core.problem import COLLECT, Kept, Pinned, Problem
@@ -27,7 +27,7 @@ BEYOND = 5.0 * SAME  # what is missing, as a share: less than once counted as no
 def problem_with_rewards(*, use_resources: bool) -> Problem:
     """Return a problem whose rewards are not whole, with a pin that HiGHS has to respect."""
     tasks = [
-        Task(kind=COLLECT, place=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(3)
+        Task(kind=COLLECT, site=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(3)
     ]
     problem = make_problem(
         tasks, num_targets=3, use_resources=use_resources, rewards=[1.25, 2.5, 1.0 / 3.0]
@@ -68,7 +68,7 @@ def test_searches_agree_on_what_is_optimal() -> None:
     for share in (0.5 * SAME, BEYOND):
         best = Incumbent(problem, Budget(), 0.0, Plan.of(problem, range(3)))
         best.bound = Bound(value=reward * (1.0 + share), proof="milp")
-        searches = (FreeSearch(best, 0), FleetSearch(best, 0))
+        searches = (AgilitySearch(best, 0), FleetSearch(best, 0))
         assert {search.best.is_optimal for search in searches} == {share < SAME}
         ended = {search.best.solution().termination for search in searches}
         assert (Termination.OPTIMAL in ended) == (share < SAME)
@@ -91,7 +91,7 @@ def test_a_valid_plan_is_better_than_any_other_and_what_is_kept_is_in_it() -> No
 def test_bounds_only_fall_and_are_rounded_to_what_rewards_add_up_to() -> None:
     problem = random_problem(3, use_resources=False, num_collects=30, num_targets=20)
     best = Incumbent(problem, Budget(), 0.0)
-    first = len(np.unique(problem.opportunities.place))
+    first = len(np.unique(problem.opportunities.site))
     assert best.bound.value == first
     assert best.lower(Bound(value=first - 1.5, proof="milp"))
     assert best.bound.value == first - 2.0

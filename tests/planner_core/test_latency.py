@@ -60,7 +60,7 @@ def best_by_enumeration(
     network: Network, levels: EnergyLevels, layers: Layers, weight: Floats
 ) -> float:
     """Return the most that any path gains, path by path and layer by layer."""
-    m = len(network.place)
+    m = len(network.site)
 
     def from_here(last: int, energy: int, layer: int) -> float:
         """Return the most from a task on, in a layer that is entered or gone on in."""
@@ -110,8 +110,8 @@ def test_the_programme_finds_the_best_path(
     assert np.all(np.diff(layer) >= 0)
 
 
-def prices_of(problem: Problem, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return prices of targets and contacts, some of them nothing."""
+def multipliers_of(problem: Problem, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Return multipliers of targets and contacts, some of them nothing."""
     num_contacts = int((problem.opportunities.kind == CONTACT).sum())
     targets = rng.uniform(-0.5, 1.0, len(problem.target_ids)) * problem.best_worth
     contacts = rng.uniform(-10.0, 20.0, num_contacts)
@@ -127,7 +127,7 @@ def prices_of(problem: Problem, rng: np.random.Generator) -> tuple[Floats, Float
     num_satellites=st.integers(1, 2),
     has_quality=st.booleans(),
 )
-def test_no_plan_beats_any_prices(
+def test_no_plan_beats_any_multipliers(
     dynamics: Dynamics,
     seed: int,
     collected_share: float,
@@ -143,7 +143,7 @@ def test_no_plan_beats_any_prices(
     best = best_reward(problem)
     rng = np.random.default_rng(seed)
     for _ in range(3):
-        targets, contacts = prices_of(problem, rng)
+        targets, contacts = multipliers_of(problem, rng)
         assert latency_value(problem, targets, contacts) >= best - 1e-9
     stop = np.zeros(1, dtype=np.uint8)
     ascent = LatencyAscent(problem, np.zeros(len(problem.target_ids)))
@@ -166,7 +166,7 @@ def test_no_plan_beats_what_estimates_of_energy_lead_to(
         ascent.improve(5, best, np.zeros(1, dtype=np.uint8))
         assert ascent.bound(is_last=False).value >= best - 1e-9
     assert ascent.bound().value >= best - 1e-9
-    assert latency_value(problem, ascent.prices, ascent.contact_prices) >= best - 1e-9
+    assert latency_value(problem, ascent.multipliers, ascent.contact_multipliers) >= best - 1e-9
 
 
 def test_groups_of_contacts_bound_all_plans_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +178,7 @@ def test_groups_of_contacts_bound_all_plans_too(monkeypatch: pytest.MonkeyPatch)
         )
         problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=300.0))
         best = best_reward(problem)
-        assert latency_value(problem, *prices_of(problem, rng)) >= best - 1e-9
+        assert latency_value(problem, *multipliers_of(problem, rng)) >= best - 1e-9
 
 
 def test_small_problems_end_at_or_near_the_optimum() -> None:
@@ -190,7 +190,7 @@ def test_small_problems_end_at_or_near_the_optimum() -> None:
     assert reached >= 34
 
 
-def test_a_price_of_contacts_lowers_the_bound() -> None:
+def test_a_multiplier_of_contacts_lowers_the_bound() -> None:
     """Contacts that could each take down a few images only, at next to no energy."""
     problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
@@ -213,11 +213,11 @@ def test_the_bound_of_a_plan_is_proven_by_its_document() -> None:
     ascent.improve(40, 0.0, np.zeros(1, dtype=np.uint8))
     bound = replace(ascent.bound(), value=rounded_bound(problem, ascent.bound().value, 0.0))
     read = from_json(to_json(bound))
-    assert read.contact_prices is not None
-    assert read.prices is not None
+    assert read.contact_multipliers is not None
+    assert read.multipliers is not None
     assert is_proven(problem, read)
     assert not is_proven(problem, replace(read, value=0.99 * read.value))
-    dearer = replace(read, contact_prices=read.contact_prices + 1e3)
+    dearer = replace(read, contact_multipliers=read.contact_multipliers + 1e3)
     assert not is_proven(problem, dearer)
 
 

@@ -18,7 +18,7 @@ from planner_core.budget import Budget
 from planner_core.domain import Horizon, Scenario, Sensor, Target
 from planner_core.errors import InvalidScenario
 from planner_core.orbits.ephemeris import Ephemeris, propagate
-from planner_core.orbits.places import Places, view
+from planner_core.orbits.sites import Sites, view
 from planner_core.problem import ACCESS_FOUND, OUTSIDE_LIMITS
 from planner_core.reasons.access_changes import access_changes
 from tests.examples import examples
@@ -32,10 +32,10 @@ WIDE = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=60.0)
 
 def plainly_within(path: Ephemeris, limits: Sensor | Target, target: Target, t: Floats) -> Bools:
     """Judge the limits of light, time, side and direction instant by instant."""
-    place = Places.of([target])
+    site = Sites.of([target])
     position, velocity = path.state_itrf(t)
     sun = path.sun_itrf(t)
-    height_deg = np.degrees(np.arcsin(sun @ place.up[0]))
+    height_deg = np.degrees(np.arcsin(sun @ site.up[0]))
     holds = np.ones(len(t), dtype=np.bool_)
     if limits.sun_elevation_min_deg is not None:
         holds &= height_deg >= limits.sun_elevation_min_deg
@@ -47,7 +47,7 @@ def plainly_within(path: Ephemeris, limits: Sensor | Target, target: Target, t: 
         since_h = (time_h - limits.local_time_from_h) % 24.0
         span_h = (limits.local_time_to_h - limits.local_time_from_h) % 24.0
         holds &= (since_h <= span_h) | (span_h == 0.0)
-    left = np.cross(position, velocity) @ place.position_m[0] >= 0.0
+    left = np.cross(position, velocity) @ site.position_m[0] >= 0.0
     if limits.look_side != "any":
         holds &= left if limits.look_side == "left" else ~left
     if limits.orbit_direction != "any":
@@ -58,10 +58,10 @@ def plainly_within(path: Ephemeris, limits: Sensor | Target, target: Target, t: 
 
 def assert_same_windows(sensor: Sensor, target: Target, span_h: float = 24.0) -> int:
     path = propagate(satellite(orbit(inclination_deg=97.4)), hours(span_h))
-    place = Places.of([target])
+    site = Sites.of([target])
 
     def holds(t: Floats) -> Bools:
-        seen = view(path, place.at(np.zeros(len(t), dtype=np.int32)), t, sensor.nadir)
+        seen = view(path, site.at(np.zeros(len(t), dtype=np.int32)), t, sensor.nadir)
         return np.asarray(
             (seen.elevation_deg >= 0.0)
             & (seen.off_nadir_deg <= sensor.off_nadir_max_deg)
@@ -70,7 +70,7 @@ def assert_same_windows(sensor: Sensor, target: Target, span_h: float = 24.0) ->
         )
 
     expected = [w for w in windows_by_scan(holds, path.duration_s) if w[1] - w[0] > 0.002]
-    found = find_accesses(path, place, Limits.of_targets(sensor, [target]))
+    found = find_accesses(path, site, Limits.of_targets(sensor, [target]))
     lasting = found.end_s - found.start_s > 1.0
     for start, end in expected:
         inside = (found.end_s > start) & (found.start_s < end)
@@ -83,23 +83,23 @@ def assert_same_windows(sensor: Sensor, target: Target, span_h: float = 24.0) ->
 def test_a_collect_keeps_clear_of_the_sun() -> None:
     """Over the year's end the sun stands in the south: seen from the north it glares behind."""
     path = propagate(satellite(orbit(inclination_deg=97.4)), hours(24.0))
-    place = Places.of([NORTH])
+    site = Sites.of([NORTH])
     sensor = replace(WIDE, sun_exclusion_deg=75.0)
 
     def angle_deg(t: Floats) -> Floats:
         position, _ = path.state_itrf(t)
-        sight = place.position_m[0] - position
+        sight = site.position_m[0] - position
         sight /= np.linalg.norm(sight, axis=1)[:, None]
         return np.asarray(np.degrees(np.arccos(np.einsum("ij,ij->i", sight, path.sun_itrf(t)))))
 
     def holds(t: Floats) -> Bools:
-        seen = view(path, place.at(np.zeros(len(t), dtype=np.int32)), t, sensor.nadir)
+        seen = view(path, site.at(np.zeros(len(t), dtype=np.int32)), t, sensor.nadir)
         in_sight = (seen.elevation_deg >= 0.0) & (seen.off_nadir_deg <= sensor.off_nadir_max_deg)
         return np.asarray(in_sight & (angle_deg(t) >= 75.0))
 
     expected = [w for w in windows_by_scan(holds, path.duration_s) if w[1] - w[0] > 0.01]
-    found = find_accesses(path, place, Limits.of_targets(sensor, [NORTH]))
-    whole = find_accesses(path, place, Limits.of_targets(WIDE, [NORTH]))
+    found = find_accesses(path, site, Limits.of_targets(sensor, [NORTH]))
+    whole = find_accesses(path, site, Limits.of_targets(WIDE, [NORTH]))
     assert len(found) == len(expected)
     assert found.start_s == pytest.approx([w[0] for w in expected], abs=0.002)
     assert found.end_s == pytest.approx([w[1] for w in expected], abs=0.002)
@@ -191,13 +191,13 @@ def test_each_target_keeps_its_own_limits_in_a_mixed_list() -> None:
         replace(NORTH, id="left", look_side="left"),
     ]
     path = propagate(satellite(), hours(24))
-    together = find_accesses(path, Places.of(mixed), Limits.of_targets(WIDE, mixed))
+    together = find_accesses(path, Sites.of(mixed), Limits.of_targets(WIDE, mixed))
     for index, one in enumerate(mixed):
-        alone = find_accesses(path, Places.of([one]), Limits.of_targets(WIDE, [one]))
-        own = together.place == index
+        alone = find_accesses(path, Sites.of([one]), Limits.of_targets(WIDE, [one]))
+        own = together.site == index
         assert together.start_s[own].tolist() == alone.start_s.tolist()
         assert together.end_s[own].tolist() == alone.end_s.tolist()
-    assert len(set(np.bincount(together.place).tolist())) > 1
+    assert len(set(np.bincount(together.site).tolist())) > 1
 
 
 def test_a_high_target_has_a_high_horizon() -> None:
@@ -206,7 +206,7 @@ def test_a_high_target_has_a_high_horizon() -> None:
     limits = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=90.0)
     path = propagate(satellite(), hours(3))
     low, high = (
-        find_accesses(path, Places.of([t]), Limits.of_targets(limits, [t]))
+        find_accesses(path, Sites.of([t]), Limits.of_targets(limits, [t]))
         for t in (NORTH, mountain)
     )
     assert len(low) == len(high) == 2

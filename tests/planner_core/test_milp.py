@@ -55,7 +55,7 @@ def assert_equals_brute_force(problem: Problem, formulation: Any) -> None:
     assert solution.proven is not None
     assert solution.bound == pytest.approx(best, abs=1e-4)
     assert solution.bound >= best - 1e-9
-    # Prices may suffice; where they do, they prove it to whoever asks.
+    # Multipliers may suffice; where they do, they prove it to whoever asks.
     if problem.use_resources or formulation == "pairwise":
         assert solution.proven.proof == "milp"
     assert is_proven(problem, solution.proven) is not False
@@ -139,10 +139,10 @@ def test_no_plan_beats_the_relaxation(
 def test_a_target_already_collected_may_be_the_way_to_another() -> None:
     """From t0 to t1 there is only t0 again, which turns the satellite on the way."""
     tasks = [
-        Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0),
-        Task(kind=COLLECT, place=0, start_s=40.0, end_s=70.0, turn_deg=50.0),
-        Task(kind=COLLECT, place=1, start_s=75.0, end_s=105.0, angle_deg=50.0),
-        Task(kind=COLLECT, place=2, start_s=0.5, end_s=31.0, angle_deg=3.0),
+        Task(kind=COLLECT, site=0, start_s=0.0, end_s=30.0),
+        Task(kind=COLLECT, site=0, start_s=40.0, end_s=70.0, turn_deg=50.0),
+        Task(kind=COLLECT, site=1, start_s=75.0, end_s=105.0, angle_deg=50.0),
+        Task(kind=COLLECT, site=2, start_s=0.5, end_s=31.0, angle_deg=3.0),
     ]
     problem = make_problem(tasks, num_targets=3, use_resources=False, agility=SLOW)
     assert not is_transitive(problem)
@@ -155,9 +155,9 @@ def test_two_satellites_share_a_station_up_to_its_antennas() -> None:
     tasks = []
     for satellite in (0, 1):
         tasks += [
-            Task(kind=CONTACT, place=0, satellite=satellite, start_s=300.0, end_s=400.0),
+            Task(kind=CONTACT, site=0, satellite=satellite, start_s=300.0, end_s=400.0),
             *(
-                Task(kind=COLLECT, place=3 * satellite + i, satellite=satellite,
+                Task(kind=COLLECT, site=3 * satellite + i, satellite=satellite,
                      start_s=start_s, end_s=start_s + 30.0)
                 for i, start_s in enumerate((100.0, 200.0, 600.0))
             ),
@@ -191,7 +191,7 @@ def test_a_plan_that_touches_a_limit_is_not_taken() -> None:
         recorder_max_fraction=0.5, initial_battery_fraction=1.0,
     )  # fmt: skip
     tasks = [
-        Task(kind=COLLECT, place=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(3)
+        Task(kind=COLLECT, site=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(3)
     ]
     problem = make_problem(tasks, num_targets=3, resources=resources)
     solution = Milp().solve(problem, Budget(), 0)

@@ -112,7 +112,7 @@ def test_more_data_than_all_contacts_take_is_told() -> None:
         assert bool(mistakes_of_accesses(question, table)) is is_told
         # At its border: what contacts take, to the percent, is what is told.
     most = float((table.end_s - table.start_s)[table.kind == CONTACT].sum())
-    images = np.unique(table.place[table.kind != CONTACT])
+    images = np.unique(table.site[table.kind != CONTACT])
     needed = sum(asked.targets[i].collect_s for i in images) * own.collect_fill_per_s
     half = replace(own, downlink_per_s=0.5 * needed / most)
     question = replace(asked, satellites=(replace(asked.satellites[0], resources=half),))
@@ -138,12 +138,12 @@ def test_an_image_longer_than_any_access_is_told_before_there_are_any() -> None:
             assert any("takes longer than" in one for one in told) == is_told, off_nadir_max_deg
 
 
-def of_places(*places: tuple[float, float]) -> Scenario:
+def of_places(*sites: tuple[float, float]) -> Scenario:
     asked = optical()
     first = asked.targets[0]
     targets = tuple(
         replace(first, id=f"t{number}", lat_deg=lat_deg, lon_deg=lon_deg)
-        for number, (lat_deg, lon_deg) in enumerate(places)
+        for number, (lat_deg, lon_deg) in enumerate(sites)
     )
     return replace(asked, targets=targets)
 

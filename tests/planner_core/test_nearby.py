@@ -36,7 +36,7 @@ def problem_at_random(rng: np.random.Generator, num_new: int) -> Problem:
             start_s = float(np.round(rng.uniform(0.0, HORIZON_S - 30.0), 3))
             tasks.append(
                 Task(
-                    kind=COLLECT, place=target, start_s=start_s, end_s=start_s + 30.0,
+                    kind=COLLECT, site=target, start_s=start_s, end_s=start_s + 30.0,
                     satellite=int(rng.integers(2)), angle_deg=float(rng.uniform(-60.0, 60.0)),
                 )
             )  # fmt: skip
@@ -52,7 +52,7 @@ def question_at_random(seed: int, num_new: int) -> Question:
     rng = np.random.default_rng(seed)
     whole = problem_at_random(rng, num_new)
     table = whole.opportunities
-    known = np.flatnonzero(table.place >= num_new).astype(np.int32)
+    known = np.flatnonzero(table.site >= num_new).astype(np.int32)
     plan = Rule().solve(restricted(whole, known), Budget(), 0).plan
     base = np.sort(known[[action.opportunity for action in plan.actions]])
     frozen_until_s = float(rng.uniform(0.0, HORIZON_S / 3.0))
@@ -70,7 +70,7 @@ def question_at_random(seed: int, num_new: int) -> Question:
     )  # fmt: skip
     assert problem.origin is not None
     still = np.flatnonzero(np.isin(problem.origin, base)).astype(np.int32)
-    imaged = problem.opportunities.place[still]
+    imaged = problem.opportunities.site[still]
     return Question(
         problem=problem, base=still, num_base=int((~is_frozen).sum()),
         promised=tuple(rng.permutation(imaged)[: rng.integers(4)].tolist()),
@@ -79,7 +79,7 @@ def question_at_random(seed: int, num_new: int) -> Question:
             targets=frozenset(range(num_new)),
             lost=tuple(
                 Lost(satellite=int(table.satellite[row]), start_s=float(table.start_s[row]),
-                     target=int(table.place[row]))
+                     target=int(table.site[row]))
                 for row in gone
             ),
         ),

@@ -42,7 +42,7 @@ def weights(seed: int, kind: str, number: int) -> Floats:
     worth = rng.uniform(0.0, 5.0, number)
     if kind == "mostly nothing":
         worth *= rng.integers(0, 2, number)
-    if kind == "hardly anything":  # as prices leave it
+    if kind == "hardly anything":  # as multipliers leave it
         worth = np.where(rng.random(number) < 0.7, 1e-3 * worth, worth)
     return worth
 

@@ -84,7 +84,7 @@ def _valid(problem: Problem) -> Iterator[Timeline]:
 
 
 @examples(60)
-@example(seed=749)  # nearly nothing can be earned: prices in units overflowed 32 bits
+@example(seed=749)  # nearly nothing can be earned: multipliers in units overflowed 32 bits
 @given(seed=SEEDS)
 def test_no_plan_earns_more_than_the_bound(seed: int) -> None:
     """Every plan there is; of new images and of those on board."""
@@ -182,7 +182,7 @@ def test_every_solver_leaves_their_targets_alone(name: str) -> None:
     on_board = {image.target for image in problem.on_board}
     table = problem.opportunities
     assert not on_board & {
-        int(table.place[a.opportunity])
+        int(table.site[a.opportunity])
         for a in solution.plan.actions
         if table.kind[a.opportunity] == COLLECT
     }
@@ -193,7 +193,7 @@ OBJECTIVE = Objective(collected_share=0.5, half_life_s=7200.0)
 
 
 def _mission(*on_board: OnBoard, recorder: float | None = None, **more: object) -> Scenario:
-    places = np.random.default_rng(0).uniform((-60.0, -180.0), (60.0, 180.0), (40, 2)).tolist()
+    sites = np.random.default_rng(0).uniform((-60.0, -180.0), (60.0, 180.0), (40, 2)).tolist()
     own = satellite(orbit())
     resources = replace(Resources.paper(5668.7), recorder_capacity_mbit=1000.0)
     state = State(satellite_id=own.id, at=BEGIN, recorder_fraction=recorder, on_board=on_board)
@@ -201,7 +201,7 @@ def _mission(*on_board: OnBoard, recorder: float | None = None, **more: object) 
         "horizon": Horizon(start=BEGIN, end=BEGIN + timedelta(hours=4)),
         "satellites": (replace(own, resources=resources),),
         "targets": tuple(
-            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(places)
+            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(sites)
         ),
         "ground_stations": (GroundStation(id="sv", name="sv", lat_deg=78.2, lon_deg=15.4),),
         "objective": OBJECTIVE,
@@ -254,9 +254,9 @@ def test_a_bound_that_a_plan_beats_by_what_is_on_board_is_not_repeated(
 
 def test_a_plan_earns_by_its_own_images_and_by_those_on_board_but_not_twice() -> None:
     tasks = [
-        Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0),
-        Task(kind=COLLECT, place=1, start_s=100.0, end_s=130.0),
-        Task(kind=CONTACT, place=0, start_s=400.0, end_s=600.0),
+        Task(kind=COLLECT, site=0, start_s=0.0, end_s=30.0),
+        Task(kind=COLLECT, site=1, start_s=100.0, end_s=130.0),
+        Task(kind=CONTACT, site=0, start_s=400.0, end_s=600.0),
     ]
     roomy = replace(TIGHT, recorder_max_fraction=0.9)
     problem = with_objective(

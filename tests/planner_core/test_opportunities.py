@@ -16,8 +16,8 @@ from planner_core.errors import InvalidScenario
 def accesses(*windows_ms: tuple[int, int]) -> Accesses:
     start, end = np.array(windows_ms, dtype=np.float64).reshape(-1, 2).T / 1000.0
     none = np.zeros(len(start), dtype=np.bool_)
-    place = np.zeros(len(start), dtype=np.int32)
-    return Accesses(place=place, start_s=start, end_s=end, starts_cut=none, ends_cut=none)
+    site = np.zeros(len(start), dtype=np.int32)
+    return Accesses(site=site, start_s=start, end_s=end, starts_cut=none, ends_cut=none)
 
 
 def target(collect_s: float = 30.0) -> list[Target]:
@@ -100,7 +100,7 @@ def test_spaced_collects_lie_inside_and_no_gap_exceeds_the_spacing(
 def test_each_target_has_its_own_collect_length() -> None:
     windows = accesses((0, 20_000), (0, 20_000))
     both = Accesses(
-        place=np.array([0, 1], dtype=np.int32),
+        site=np.array([0, 1], dtype=np.int32),
         start_s=windows.start_s,
         end_s=windows.end_s,
         starts_cut=windows.starts_cut,

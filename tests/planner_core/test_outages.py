@@ -98,7 +98,7 @@ def test_the_referee_tells_each_task_in_an_outage(seed: int) -> None:
         if table.start_s[row] < one.end_s - 1e-6 and table.end_s[row] > one.start_s + 1e-6
         if table.kind[row] in one.kinds
         if (table.satellite[row] == one.satellite if one.station is None
-            else table.kind[row] == CONTACT and table.place[row] == one.station)
+            else table.kind[row] == CONTACT and table.site[row] == one.station)
     }  # fmt: skip
     assert told == expected
 

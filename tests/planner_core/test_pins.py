@@ -263,10 +263,10 @@ def test_states_that_count_as_one_are_no_worse_than_each() -> None:
 def test_two_images_of_a_target_that_must_be_taken_stay() -> None:
     """A file cannot ask for that, but a problem can."""
     tasks = [
-        Task(kind=COLLECT, place=place, start_s=start_s, end_s=start_s + 30.0)
-        for place, start_s in ((0, 100.0), (1, 200.0), (0, 300.0), (1, 400.0), (2, 500.0))
+        Task(kind=COLLECT, site=site, start_s=start_s, end_s=start_s + 30.0)
+        for site, start_s in ((0, 100.0), (1, 200.0), (0, 300.0), (1, 400.0), (2, 500.0))
     ]
-    tasks.append(Task(kind=CONTACT, place=0, start_s=800.0, end_s=900.0))
+    tasks.append(Task(kind=CONTACT, site=0, start_s=800.0, end_s=900.0))
     roomy = replace(TIGHT, initial_battery_fraction=1.0, initial_recorder_fraction=0.0)
     problem = make_problem(tasks, num_targets=3, resources=roomy)
     twice = tuple(Kept(row=row, pointer=f"/pins/keep/{row}") for row in (0, 2))

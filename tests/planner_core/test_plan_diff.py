@@ -14,11 +14,11 @@ from tests.examples import examples
 START = datetime(2026, 3, 1, tzinfo=UTC)
 
 
-def action(place: str, at_s: float, satellite: str = "s", mode: Mode = "collect") -> PlannedAction:
+def action(site: str, at_s: float, satellite: str = "s", mode: Mode = "collect") -> PlannedAction:
     start = START + timedelta(seconds=at_s)
     return PlannedAction(
         start=start, end=start + timedelta(seconds=30), satellite_id=satellite, mode=mode,
-        place_id=place,
+        site_id=site,
     )  # fmt: skip
 
 
@@ -48,8 +48,8 @@ def test_a_difference_applied_to_the_first_plan_gives_the_second(
     left = set(first) - set(diff.removed) - {before for before, _ in diff.moved}
     assert left | set(diff.added) | {after for _, after in diff.moved} == set(second)
     assert left == set(first) & set(second)
-    assert {a.place_id for a in diff.added if a.mode == "collect"}.isdisjoint(
-        a.place_id for a in diff.removed if a.mode == "collect"
+    assert {a.site_id for a in diff.added if a.mode == "collect"}.isdisjoint(
+        a.site_id for a in diff.removed if a.mode == "collect"
     )
     assert diff.totals == {"reward": 2.5}
     assert not diff.is_empty

@@ -15,7 +15,7 @@ from planner_core.budget import Budget
 from planner_core.build import build_problem
 from planner_core.domain import Agility, Scenario, mean_elements
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places, line_of_sight_teme
+from planner_core.orbits.sites import Sites, line_of_sight_teme
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -66,13 +66,13 @@ def test_lines_of_sight_are_those_of_the_orbit_code(problem: Problem) -> None:
     rng = np.random.default_rng(0)
     for one, path in zip(scenario().satellites, pointing.paths, strict=True):
         orbit = propagate(one, scenario().horizon)
-        for points, places in (
+        for points, sites in (
             (targets(60), pointing.targets_m), (STATIONS, pointing.stations_m),
         ):  # fmt: skip
-            place = rng.integers(len(points), size=300).astype(np.int32)
+            site = rng.integers(len(points), size=300).astype(np.int32)
             t_s = rng.uniform(0.0, problem.horizon_s, 300)
-            known = line_of_sight_teme(orbit, Places.of(points).at(place), t_s)
-            assert np.degrees(np.abs(sights(path, places, place, t_s) - known)).max() < 1e-9
+            known = line_of_sight_teme(orbit, Sites.of(points).at(site), t_s)
+            assert np.degrees(np.abs(sights(path, sites, site, t_s) - known)).max() < 1e-9
 
 
 def test_they_are_those_of_the_table_at_its_own_instants(problem: Problem) -> None:
@@ -89,12 +89,12 @@ def test_they_agree_with_skyfield() -> None:
     pointing = built(asked).pointing
     assert pointing is not None
     t_s = np.linspace(1.0, 21_000.0, 50)
-    place = np.arange(50, dtype=np.int32)
+    site = np.arange(50, dtype=np.int32)
     path = SkyfieldPath(mean_elements(asked.satellites[0].orbit), asked.horizon)
     orbit = propagate(asked.satellites[0], asked.horizon)
-    away = pointing.targets_m[place] - path.position_m(t_s)
+    away = pointing.targets_m[site] - path.position_m(t_s)
     known = orbit.to_teme(away / np.linalg.norm(away, axis=1)[:, None], t_s)
-    found = sights(pointing.paths[0], pointing.targets_m, place, t_s)
+    found = sights(pointing.paths[0], pointing.targets_m, site, t_s)
     assert angle_deg(found, known).max() < 3e-3
 
 
@@ -121,25 +121,25 @@ def test_earliest_and_latest_starts_suffice_and_a_moment_less_does_not(
     problem = flat_problem(seed, num_targets=6)
     pointing = problem.pointing
     assert pointing is not None
-    path, places = pointing.paths[0], pointing.targets_m
+    path, sites = pointing.paths[0], pointing.targets_m
     agile = agile_of(rate, acceleration, settle_s)
     a, b = rng.choice(6, 2, replace=False)
     end_s = round(float(rng.uniform(0.0, 300.0)), 3)
-    looked = sight(path, places, int(a), end_s)
-    start = earliest_start_s(agile, end_s, looked, path, places, int(b), 0.0, 590.0)
-    need = needed_s(agile, looked, sight(path, places, int(b), start))
+    looked = sight(path, sites, int(a), end_s)
+    start = earliest_start_s(agile, end_s, looked, path, sites, int(b), 0.0, 590.0)
+    need = needed_s(agile, looked, sight(path, sites, int(b), start))
     assert start - end_s >= need - 1e-6
     assert round(start, 3) == pytest.approx(start, abs=1e-9)
     if acceleration is None:
         sooner = start - 0.005
-        assert sooner - end_s < needed_s(agile, looked, sight(path, places, int(b), sooner))
-    looks = sight(path, places, int(b), 400.0)
-    late = latest_start_s(agile, 400.0, looks, path, places, int(a), 30.0, 0.0, 590.0)
-    need = needed_s(agile, sight(path, places, int(a), late + 30.0), looks)
+        assert sooner - end_s < needed_s(agile, looked, sight(path, sites, int(b), sooner))
+    looks = sight(path, sites, int(b), 400.0)
+    late = latest_start_s(agile, 400.0, looks, path, sites, int(a), 30.0, 0.0, 590.0)
+    need = needed_s(agile, sight(path, sites, int(a), late + 30.0), looks)
     assert 400.0 - late - 30.0 >= need - 1e-6
     if acceleration is None:
         later = late + 0.005
-        assert 370.0 - later < needed_s(agile, sight(path, places, int(a), later + 30.0), looks)
+        assert 370.0 - later < needed_s(agile, sight(path, sites, int(a), later + 30.0), looks)
 
 
 def test_the_referee_looks_where_a_moved_collect_looks(problem: Problem) -> None:
@@ -152,11 +152,11 @@ def test_the_referee_looks_where_a_moved_collect_looks(problem: Problem) -> None
         start_s = float(np.ceil(table.access_start_s[b] * 1e3) / 1e3)
         first = Action(float(table.start_s[a]), float(table.end_s[a]), a)
         moved = Action(start_s, start_s + 30.0, b)
-        if moved.start_s < first.end_s or table.place[a] == table.place[b]:
+        if moved.start_s < first.end_s or table.site[a] == table.site[b]:
             continue
         action = replay(problem, Plan((first, moved))).satellites[0].actions
         (slew,) = [one.slew for one in action if one.slew is not None]
-        looks = sights(pointing.paths[0], pointing.targets_m, table.place[[b]], np.array([start_s]))
+        looks = sights(pointing.paths[0], pointing.targets_m, table.site[[b]], np.array([start_s]))
         assert slew.angle_deg == pytest.approx(angle_deg(table.los_end[[a]], looks)[0], abs=1e-6)
         checked += abs(angle_deg(table.los_end[[a]], table.los_start[[b]])[0] - slew.angle_deg) > 1
     assert checked > 3
@@ -165,7 +165,7 @@ def test_the_referee_looks_where_a_moved_collect_looks(problem: Problem) -> None
 def _accesses(table: Opportunities) -> list[tuple[float, ...]]:
     # Of a pass there may be several contacts, which do not move.
     fixed_s = np.where(table.kind == CONTACT, table.start_s, 0.0)
-    columns = (table.satellite, table.kind, table.place, table.access_start_s, fixed_s)
+    columns = (table.satellite, table.kind, table.site, table.access_start_s, fixed_s)
     return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
@@ -186,7 +186,7 @@ def test_a_problem_with_other_starts_is_the_one_that_has_them_by_itself() -> Non
                 getattr(made.problem.opportunities, field.name) - getattr(wanted, field.name)
             )
             assert close.max() < 1e-12
-        elif field.name in ("start_s", "end_s", "access_start_s", "satellite", "place", "kind"):
+        elif field.name in ("start_s", "end_s", "access_start_s", "satellite", "site", "kind"):
             assert np.array_equal(
                 getattr(made.problem.opportunities, field.name), getattr(wanted, field.name)
             )

@@ -16,7 +16,7 @@ from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool, rows_of
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
-from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.resource_bound import whole_worth
 from planner_core.certified.proofs.satellite_relaxation import relaxations
 from planner_core.certified.tuning import tuned
@@ -48,12 +48,12 @@ def search_of(
     paths = EnergyPaths(problem)
     energy = ascent_on_energy(problem, paths, np.zeros(len(problem.target_ids)), 30, seed)
     energy.improve(30, budget.stop)
-    prices = PriceSearch(problem, max(energy.value, 1.0), energy.multipliers, budget.stop)
-    prices.step(0.0)
+    multipliers = ResourceAscent(problem, max(energy.value, 1.0), energy.multipliers, budget.stop)
+    multipliers.step(0.0)
     pool = PlanPool(problem, budget, seed)
     pool.add(start)
     losses = np.where(paths.usage > 0.0, 0.0, np.inf)
-    return ProgramSearch(problem, pool, prices, Known(losses), budget, seed), pool
+    return ProgramSearch(problem, pool, multipliers, Known(losses), budget, seed), pool
 
 
 @examples(40)
@@ -66,7 +66,7 @@ def test_plans_stay_valid_and_below_the_optimum(
     search, pool = search_of(problem, start, seed)
     rewards = [pool.reward]
     for _ in range(10):
-        search.turn()
+        search.step()
         rewards.append(pool.reward)
     timeline = replay(problem, pool.plan)
     assert timeline.is_valid
@@ -75,7 +75,7 @@ def test_plans_stay_valid_and_below_the_optimum(
     assert pool.reward <= best_reward(problem) + 1e-6
     again, its_pool = search_of(problem, start, seed)
     for _ in range(10):
-        again.turn()
+        again.step()
     assert its_pool.plan == pool.plan
 
 
@@ -85,7 +85,7 @@ def test_small_problems_end_at_the_optimum() -> None:
         problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 3)
         search, pool = search_of(problem, Rule().solve(problem, Budget(), 0).plan)
         for _ in range(20):
-            search.turn()
+            search.step()
         reached += replay(problem, pool.plan).reward == best_reward(problem)
     assert reached >= 27
 
@@ -109,7 +109,7 @@ def _changes_of_single_satellites(seed: int) -> int:
     gained = 0
     for _ in range(40):
         before = pool.plan
-        search.turn()
+        search.step()
         changed = {*rows_of(before)} ^ {*rows_of(pool.plan)}
         assert len(set(problem.opportunities.satellite[list(changed)])) <= 1
         gained += pool.plan != before
@@ -165,6 +165,6 @@ def test_a_search_that_is_stopped_keeps_its_plan() -> None:
     search, pool = search_of(problem, plan, budget=budget)
     budget.cancel()
     for _ in range(5):
-        search.turn()
+        search.step()
     pool.merge()
     assert pool.plan == plan

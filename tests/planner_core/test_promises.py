@@ -73,10 +73,10 @@ def test_what_is_promised_and_frozen_holds(seed: int) -> None:
 
 def _passes() -> Problem:
     tasks = [
-        Task(kind=0, place=0, start_s=50.0, end_s=80.0),
-        Task(kind=1, place=0, start_s=150.0, end_s=260.0),
-        Task(kind=0, place=1, start_s=300.0, end_s=330.0),
-        Task(kind=1, place=0, start_s=600.0, end_s=700.0),
+        Task(kind=0, site=0, start_s=50.0, end_s=80.0),
+        Task(kind=1, site=0, start_s=150.0, end_s=260.0),
+        Task(kind=0, site=1, start_s=300.0, end_s=330.0),
+        Task(kind=1, site=0, start_s=600.0, end_s=700.0),
     ]
     problem = make_problem(tasks, num_targets=2, resources=ROOMY)
     return with_objective(problem, Objective(collected_share=0.9))

@@ -246,7 +246,7 @@ def test_what_pins_prove_no_plan_that_honours_them_contains(seed: int, use_resou
 
 def test_a_task_beyond_the_breadth_was_not_considered() -> None:
     tasks = [
-        Task(kind=COLLECT, place=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(5)
+        Task(kind=COLLECT, site=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(5)
     ]
     problem = make_problem(tasks, num_targets=5, use_resources=False)
     plan = Plan.of(problem, [0])
@@ -259,8 +259,8 @@ def test_a_task_beyond_the_breadth_was_not_considered() -> None:
 
 def test_a_contact_that_the_search_left_out_takes_no_breadth() -> None:
     tasks = [
-        Task(kind=CONTACT, place=0, start_s=100.0, end_s=130.0),
-        Task(kind=COLLECT, place=0, start_s=200.0, end_s=230.0),
+        Task(kind=CONTACT, site=0, start_s=100.0, end_s=130.0),
+        Task(kind=COLLECT, site=0, start_s=200.0, end_s=230.0),
     ]
     problem = make_problem(tasks, num_targets=1)
     plan = Plan.of(problem, [])
@@ -281,7 +281,7 @@ def test_a_contact_that_the_search_left_out_takes_no_breadth() -> None:
     ],
 )
 def test_a_target_without_opportunity_says_what_geometry_proves(why: Any, words: str) -> None:
-    task = Task(kind=COLLECT, place=0, start_s=0.0, end_s=30.0)
+    task = Task(kind=COLLECT, site=0, start_s=0.0, end_s=30.0)
     problem = make_problem([task], num_targets=2)
     problem.target_access[1] = why
     plan = Plan.of(problem, [0])

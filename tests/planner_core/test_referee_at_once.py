@@ -23,7 +23,7 @@ from planner_core.referee.alone import judge_alone, judged_alone
 from planner_core.referee.contact_flow import flow, flows
 from planner_core.referee.idle_time import idle_spans
 from planner_core.referee.replay import replay
-from planner_core.referee.resource_profile import places_of
+from planner_core.referee.resource_profile import indices_of
 from planner_core.referee.rules import slews, turns, windows
 from planner_core.referee.sight import lines_of_sight
 from planner_core.solvers.sequential import blocked_rows
@@ -166,7 +166,7 @@ def test_contacts_are_blocked_that_overlap_too_many(seed: int, antennas: int) ->
                 other
                 for other in taken
                 if table.kind[other] == table.kind[row] == CONTACT
-                and table.place[other] == table.place[row]
+                and table.site[other] == table.site[row]
                 and table.start_s[other] < table.end_s[row]
                 and table.end_s[other] > table.start_s[row]
             ]
@@ -253,9 +253,9 @@ def test_the_best_image_of_each_target_is_that_of_a_walk(seed: int) -> None:
         row = plan.actions[position].opportunity
         if table.kind[row] != COLLECT or position in blamed:
             continue
-        first = best.setdefault(int(table.place[row]), position)
+        first = best.setdefault(int(table.site[row]), position)
         if problem.worth[row] > problem.worth[plan.actions[first].opportunity]:
-            best[int(table.place[row])] = position
+            best[int(table.site[row])] = position
     found = timeline.collected
     assert [(target, image.position) for target, image in found.items()] == list(best.items())
     num_images = sum(table.kind[action.opportunity] == COLLECT for action in plan.actions)
@@ -269,4 +269,4 @@ def test_places_among_instants_are_those_that_a_search_finds(seed: int) -> None:
     rng = np.random.default_rng(seed)
     spans = rng.integers(0, 30, (12, 2)).astype(np.float64)
     times = np.unique(np.append(spans, [0.0, 30.0]))
-    assert places_of(times, spans).tolist() == np.searchsorted(times, spans).tolist()
+    assert indices_of(times, spans).tolist() == np.searchsorted(times, spans).tolist()

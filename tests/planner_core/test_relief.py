@@ -20,9 +20,9 @@ from tests.planner_core.problems import TIGHT, Task, make_problem, random_proble
 
 FULL = replace(TIGHT, initial_recorder_fraction=TIGHT.recorder_max_fraction + 0.1)
 TASKS = [
-    Task(kind=COLLECT, place=0, start_s=50.0, end_s=60.0),
-    Task(kind=CONTACT, place=0, start_s=100.0, end_s=200.0),
-    Task(kind=COLLECT, place=1, start_s=400.0, end_s=410.0),
+    Task(kind=COLLECT, site=0, start_s=50.0, end_s=60.0),
+    Task(kind=CONTACT, site=0, start_s=100.0, end_s=200.0),
+    Task(kind=COLLECT, site=1, start_s=400.0, end_s=410.0),
 ]
 
 
@@ -65,7 +65,7 @@ def test_an_image_without_energy_or_room_is_to_blame_though_no_level_moves(code:
     """An empty battery cannot fall, nor a full recorder rise: what is asked of them is broken."""
     battery, recorder = (0.0, 0.0) if code == "battery" else (0.9, 1.0)
     worn = replace(TIGHT, initial_battery_fraction=battery, initial_recorder_fraction=recorder)
-    image = Task(kind=COLLECT, place=0, start_s=0.0, end_s=10.0)
+    image = Task(kind=COLLECT, site=0, start_s=0.0, end_s=10.0)
     problem = make_problem([image], num_targets=1, resources=worn)
     timeline = replay(problem, Plan.of(problem, [0]))
     (broken,) = timeline.violations
@@ -74,7 +74,7 @@ def test_an_image_without_energy_or_room_is_to_blame_though_no_level_moves(code:
 
 
 def test_a_recorder_that_fills_again_is_not_inherited() -> None:
-    again = Task(kind=COLLECT, place=0, start_s=500.0, end_s=600.0)
+    again = Task(kind=COLLECT, site=0, start_s=500.0, end_s=600.0)
     problem = make_problem([*TASKS, again], num_targets=2, resources=FULL)
     timeline = replay(problem, Plan.of(problem, [1, 2, 3]))
     assert [(v.blamed, v.inherited) for v in timeline.violations] == [((), True), ((2,), False)]

@@ -20,7 +20,7 @@ from planner_core.problem import COLLECT, CONTACT, Blocked, Kept, Pinned, Proble
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.replanning import days
-from planner_core.replanning.known import KnownPrices, bound_at, prices_of
+from planner_core.replanning.known import KnownMultipliers, bound_at, multipliers_of
 from planner_core.replanning.programs import fewest_changes
 from planner_core.replanning.question import Question
 from planner_core.replanning.replan import first_plan, improved, solve_replan
@@ -90,7 +90,7 @@ def event_at_random(
         return None  # what is flown lies in the outage, or leaves no way to keep the limits
     assert problem.origin is not None
     still = np.flatnonzero(np.isin(problem.origin, taken))
-    imaged = problem.opportunities.place[still[problem.opportunities.kind[still] == COLLECT]]
+    imaged = problem.opportunities.site[still[problem.opportunities.kind[still] == COLLECT]]
     promised = rng.permutation(np.unique(imaged))[: rng.integers(3)]
     question = Question(
         problem=problem, base=still.astype(np.int32), num_base=len(taken) - len(frozen),
@@ -284,7 +284,7 @@ def test_the_share_of_changes_holds_when_the_time_is_over() -> None:
 
 def test_a_target_worth_more_than_the_changes_is_taken_and_one_worth_less_is_not() -> None:
     def left_by(plan: Plan) -> list[int]:
-        imaged = {int(whole.opportunities.place[a.opportunity]) for a in plan.actions}
+        imaged = {int(whole.opportunities.site[a.opportunity]) for a in plan.actions}
         return [t for t in range(12) if t not in imaged and len(whole.collects_of(t))]
 
     for seed in range(50):
@@ -297,7 +297,7 @@ def test_a_target_worth_more_than_the_changes_is_taken_and_one_worth_less_is_not
     assert left
     rows = np.array(sorted(a.opportunity for a in base.actions), dtype=np.int32)
     for factor, is_taken in ((0.5, False), (50.0, True)):
-        worth = np.where(np.isin(whole.opportunities.place, left), factor, whole.worth)
+        worth = np.where(np.isin(whole.opportunities.site, left), factor, whole.worth)
         question = Question(
             problem=replace(whole, worth=worth), base=rows, num_base=len(rows), promised=(),
             stability=Stability(),
@@ -362,9 +362,9 @@ def test_where_the_plan_breaks_a_limit_no_plan_counts_more(seed: int) -> None:
 
 
 @examples(60)
-@given(seed=SEEDS, use_resources=st.booleans(), has_prices=st.booleans())
+@given(seed=SEEDS, use_resources=st.booleans(), has_multipliers=st.booleans())
 def test_the_multipliers_of_the_plan_before_prove_a_bound(
-    seed: int, use_resources: bool, has_prices: bool
+    seed: int, use_resources: bool, has_multipliers: bool
 ) -> None:
     happened = event_at_random(seed, use_resources=use_resources)
     if happened is None:
@@ -376,55 +376,63 @@ def test_the_multipliers_of_the_plan_before_prove_a_bound(
     ids = [name for name in whole.target_ids if rng.random() < 0.7]
     proof = quick_bound(whole, 0.0)
     some = rng.uniform(0.0, 2.0, len(ids))
-    if has_prices and proof.prices is not None and len(proof.prices) == len(whole.target_ids):
-        some = proof.prices[[whole.target_ids.index(name) for name in ids]]
+    if (
+        has_multipliers
+        and proof.multipliers is not None
+        and len(proof.multipliers) == len(whole.target_ids)
+    ):
+        some = proof.multipliers[[whole.target_ids.index(name) for name in ids]]
     unit = 0.5 if use_resources else None
-    known = KnownPrices(
-        bound=Bound(value=0.0, proof="dp", prices=some, unit=unit), target_ids=tuple(ids)
+    known = KnownMultipliers(
+        bound=Bound(value=0.0, proof="dp", multipliers=some, unit=unit), target_ids=tuple(ids)
     )
-    prices = known.on(problem)
+    multipliers = known.on(problem)
     best = best_plan(problem)
-    assert prices is not None
+    assert multipliers is not None
     if best is None:
         return
     reward = replay(problem, best).reward
-    assert bound_at(problem, prices, 0.0).value >= reward - 1e-6
+    assert bound_at(problem, multipliers, 0.0).value >= reward - 1e-6
     solution = solve_replan(question, Certified(), Budget(), 0, known)
     assert solution.bound is not None
     assert solution.bound >= reward - 1e-6
 
 
-def test_prices_without_multipliers_are_nothing_known() -> None:
+def test_multipliers_without_multipliers_are_nothing_known() -> None:
     whole = random_problem(0, use_resources=False)
-    assert prices_of(None, whole.target_ids) is None
-    assert prices_of(Bound(value=1.0, proof="milp"), whole.target_ids) is None
-    of_fewer = KnownPrices(
-        bound=Bound(value=1.0, proof="lagrangian", prices=np.zeros(1)), target_ids=("a", "b")
+    assert multipliers_of(None, whole.target_ids) is None
+    assert multipliers_of(Bound(value=1.0, proof="milp"), whole.target_ids) is None
+    of_fewer = KnownMultipliers(
+        bound=Bound(value=1.0, proof="lagrangian", multipliers=np.zeros(1)), target_ids=("a", "b")
     )
     assert of_fewer.on(whole) is None
 
 
 @pytest.mark.parametrize("use_resources", [True, False])
-def test_what_comes_in_has_the_price_of_its_like_where_energy_is_short(use_resources: bool) -> None:
+def test_what_comes_in_has_the_multiplier_of_its_like_where_energy_is_short(
+    use_resources: bool,
+) -> None:
     whole = random_problem(0, use_resources=use_resources, num_targets=9, num_collects=12)
     usual = whole.typical_worth
-    is_last = whole.opportunities.place == 8
+    is_last = whole.opportunities.site == 8
     dear = replace(
         whole, worth=np.where(is_last & (whole.opportunities.kind == COLLECT), 3 * usual, usual)
     )
-    known = KnownPrices(
-        bound=Bound(value=1.0, proof="dp", prices=np.array([0.0, 0.1, 0.7]) * usual, unit=usual),
+    known = KnownMultipliers(
+        bound=Bound(
+            value=1.0, proof="dp", multipliers=np.array([0.0, 0.1, 0.7]) * usual, unit=usual
+        ),
         target_ids=whole.target_ids[:3],
     )
     found = known.on(dear)
     assert found is not None
-    assert found.prices is not None
+    assert found.multipliers is not None
     left = np.maximum(0.0, dear.best_worth - 0.5 * dear.typical_worth)
     expected = np.array([0.0, 0.1 * usual, 0.7 * usual, *left[3:]])
     if use_resources:
         expected[3:8] = np.minimum(0.1 * usual, left[3:8])
     assert expected[8] > 2 * usual
-    assert found.prices == pytest.approx(np.minimum(expected, dear.best_worth))
+    assert found.multipliers == pytest.approx(np.minimum(expected, dear.best_worth))
 
 
 def test_replans_one_after_the_other_do_not_count_in_ever_smaller_units() -> None:
@@ -432,8 +440,8 @@ def test_replans_one_after_the_other_do_not_count_in_ever_smaller_units() -> Non
     whole = random_problem(0, num_targets=9, num_collects=12)
     unit = 1.0
     for number in range(3, 9):
-        known = KnownPrices(
-            bound=Bound(value=1.0, proof="dp", prices=np.zeros(number), unit=unit),
+        known = KnownMultipliers(
+            bound=Bound(value=1.0, proof="dp", multipliers=np.zeros(number), unit=unit),
             target_ids=whole.target_ids[:number],
         )
         found = known.on(whole)

@@ -48,8 +48,8 @@ def test_no_plan_beats_the_bound(
     assert quick_bound(problem, reward=0.0).value >= best - 1e-9
     rng = np.random.default_rng(seed)
     for unit in (1.0, 0.1, 0.37):
-        prices = rng.uniform(-1.0, 6.0, len(problem.target_ids))
-        assert resource_value(problem, prices, unit) >= best - 1e-9
+        multipliers = rng.uniform(-1.0, 6.0, len(problem.target_ids))
+        assert resource_value(problem, multipliers, unit) >= best - 1e-9
 
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
@@ -60,7 +60,7 @@ def test_it_is_the_optimum_where_no_target_can_be_collected_twice(
 ) -> None:
     rng = np.random.default_rng(seed)
     tasks = [
-        Task(kind=0, place=i, start_s=start_s, end_s=start_s + 30.0, angle_deg=angle_deg)
+        Task(kind=0, site=i, start_s=start_s, end_s=start_s + 30.0, angle_deg=angle_deg)
         for i, (start_s, angle_deg) in enumerate(
             zip(np.round(rng.uniform(0, 940, 9), 3), rng.uniform(-55, 55, 9), strict=True)
         )
@@ -91,7 +91,7 @@ def test_it_is_that_of_agility_where_near_pairs_take_too_long(
 
 @examples(30)
 @given(seed=SEEDS)
-def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
+def test_the_stored_multipliers_prove_the_bound_again(seed: int) -> None:
     problem = _problem(seed, "physical", 2, num_collects=60, num_targets=30, num_contacts=4)
     bound = quick_bound(problem, reward=0.0)
     assert is_proven(problem, bound)
@@ -101,7 +101,7 @@ def test_the_stored_prices_prove_the_bound_again(seed: int) -> None:
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @examples(40)
 @given(seed=SEEDS, near=st.sampled_from([None, 0.5, 1.0, 1.5]))
-def test_a_price_of_data_changes_nothing_but_the_time(
+def test_a_multiplier_of_data_changes_nothing_but_the_time(
     dynamics: Literal["physical", "paper"], seed: int, near: float | None
 ) -> None:
     problem = _problem(seed, dynamics, num_collects=14, num_targets=10, num_contacts=4)
@@ -110,10 +110,10 @@ def test_a_price_of_data_changes_nothing_but_the_time(
     worth[problem.opportunities.kind == CONTACT] = 0
     stop = np.zeros(1, dtype=np.uint8)
     for relaxation in relaxations(problem, 2):
-        most, _ = replace(relaxation, data_price=0.0).most(worth, 1.0, 0, stop)
+        most, _ = replace(relaxation, data_multiplier=0.0).most(worth, 1.0, 0, stop)
         expected = None if near is None else int(near * most)
-        for data_price in (relaxation.with_data_price(10).data_price, 0.1, 0.5, 2.0):
-            priced = replace(relaxation, data_price=data_price)
+        for data_multiplier in (relaxation.with_data_multiplier(10).data_multiplier, 0.1, 0.5, 2.0):
+            priced = replace(relaxation, data_multiplier=data_multiplier)
             found, path = priced.most(worth, 1.0, 0, stop, near=expected, keeps_path=True)
             assert found == most
             assert path is not None

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress
 from planner_core.certified.lns import resource_search
-from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.alternating import AlternatingSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -86,8 +86,8 @@ def test_small_problems_end_at_the_optimum() -> None:
     for seed in range(30):
         problem = _problem(seed, "physical" if seed % 2 else "paper", 1 + seed % 3)
         start = Rule().solve(problem, Budget(), 0).plan
-        search = TurnSearch(problem, start, 1.0, Budget(), seed)
-        search.turn(5)
+        search = AlternatingSearch(problem, start, 1.0, Budget(), seed)
+        search.step(5)
         timeline = replay(problem, search.plan)
         assert timeline.is_valid
         reached += timeline.reward == best_reward(problem)
@@ -225,10 +225,10 @@ def test_windows_have_more_steps_where_images_come_in_batches_that_are_not_dense
     problem = drawn(1, num_collects=40, num_contacts=4, num_satellites=num_satellites)
     days, moves = list[int](), list[int]()
     with tuned(dense=1 if is_dense else 1000):
-        search = TurnSearch(problem, Plan(), 1.0, Budget(), 0)
-    search.turn(1)
+        search = AlternatingSearch(problem, Plan(), 1.0, Budget(), 0)
+    search.step(1)
     monkeypatch.setattr(ChoiceSearch, "move", lambda _: days.append(1))
     monkeypatch.setattr(ResourceWindows, "make_moves", lambda _, number, __: moves.append(number))
-    search.turn(1)
+    search.step(1)
     assert len(days) == num_days
     assert moves == [num_steps * TUNING.moves_in_a_step * num_satellites]

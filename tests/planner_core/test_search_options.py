@@ -82,9 +82,9 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
 def test_breadth_counts_targets_and_not_the_collects_that_one_access_offers() -> None:
     """Three offers of a poor target come before a rich one that they exclude."""
     offers = [
-        Task(kind=COLLECT, place=0, start_s=100.0 + k, end_s=130.0 + k, access=0) for k in range(3)
+        Task(kind=COLLECT, site=0, start_s=100.0 + k, end_s=130.0 + k, access=0) for k in range(3)
     ]
-    rich = Task(kind=COLLECT, place=1, start_s=110.0, end_s=140.0)
+    rich = Task(kind=COLLECT, site=1, start_s=110.0, end_s=140.0)
     problem = make_problem([*offers, rich], num_targets=2, rewards=[1.0, 5.0], use_resources=False)
     for solver in (ForwardSearch(depth=1, breadth=2), Mcts(num_simulations=20, breadth=2)):
         assert replay(problem, solver.solve(problem, Budget(), 0).plan).reward == 5.0
@@ -92,7 +92,7 @@ def test_breadth_counts_targets_and_not_the_collects_that_one_access_offers() ->
 
 def test_the_codes_rule_collects_until_the_recorder_is_half_full_and_no_further() -> None:
     """The text stops before its limit of half full is crossed; the code crosses it once."""
-    tasks = [Task(kind=COLLECT, place=i, start_s=100.0 * i, end_s=100.0 * i + 30) for i in range(6)]
+    tasks = [Task(kind=COLLECT, site=i, start_s=100.0 * i, end_s=100.0 * i + 30) for i in range(6)]
     problem = make_problem(tasks, num_targets=6)
     text = Rule(feasibility="penalty")
     assert rows_of(problem, text) == [0, 1]
@@ -120,9 +120,9 @@ def test_the_codes_discount_reaches_to_the_next_action() -> None:
     paper, each times 2's own R = 0.9**40 * 50; value of 1, which excludes 2: 0.9**20 * 3.
     """
     tasks = [
-        Task(kind=COLLECT, place=0, start_s=10.0, end_s=40.0),
-        Task(kind=COLLECT, place=1, start_s=20.0, end_s=50.0, angle_deg=40.0),
-        Task(kind=COLLECT, place=2, start_s=50.0, end_s=80.0),
+        Task(kind=COLLECT, site=0, start_s=10.0, end_s=40.0),
+        Task(kind=COLLECT, site=1, start_s=20.0, end_s=50.0, angle_deg=40.0),
+        Task(kind=COLLECT, site=2, start_s=50.0, end_s=80.0),
     ]
     problem = make_problem(tasks, num_targets=3, rewards=[1.0, 3.0, 50.0], use_resources=False)
     paper = ForwardSearch(depth=2, breadth=3, gamma=0.9, window_moves_per_task=0.0)
@@ -159,7 +159,7 @@ def test_the_code_sunpoints_rather_than_image_a_target_again() -> None:
         for worthless in ("take", "sunpoint"):
             rows = rows_of(problem, replace(paper, worthless=worthless))
             table = problem.opportunities
-            images = [int(table.place[row]) for row in rows if table.kind[row] == COLLECT]
+            images = [int(table.site[row]) for row in rows if table.kind[row] == COLLECT]
             again[worthless] += len(images) - len(set(images))
     assert again["take"] > 0
     assert again["sunpoint"] == 0
@@ -168,8 +168,8 @@ def test_the_code_sunpoints_rather_than_image_a_target_again() -> None:
 @pytest.mark.parametrize("make", [ForwardSearch, Mcts], ids=["forward_search", "mcts"])
 def test_a_contact_may_count_by_the_wait_for_it(make: Any) -> None:
     """A long contact soon or a short one later, which exclude each other."""
-    soon = Task(kind=CONTACT, place=0, start_s=10.0, end_s=310.0)
-    late = Task(kind=CONTACT, place=0, start_s=300.0, end_s=360.0)
+    soon = Task(kind=CONTACT, site=0, start_s=10.0, end_s=310.0)
+    late = Task(kind=CONTACT, site=0, start_s=300.0, end_s=360.0)
     problem = make_problem([soon, late], num_targets=0)
     weights = {
         "contact_reward_per_s": 1.0, "sunpoint_reward_per_s": 0.0, "gamma": 1.0, "depth": 2,
@@ -183,7 +183,7 @@ def test_a_contact_may_count_by_the_wait_for_it(make: Any) -> None:
 def test_an_image_may_need_limits_to_count_as_made(make: Any) -> None:
     """The battery is at its end: by the text the target is still to be imaged, and is again."""
     flat = replace(TIGHT, initial_battery_fraction=0.31, sunpoint_charge_per_s=0.0)
-    tasks = [Task(kind=COLLECT, place=0, start_s=t, end_s=t + 30.0) for t in (100.0, 300.0)]
+    tasks = [Task(kind=COLLECT, site=0, start_s=t, end_s=t + 30.0) for t in (100.0, 300.0)]
     problem = make_problem(tasks, num_targets=1, resources=flat)
     soft = {"feasibility": "penalty", "penalty": 0.0, "depth": 2}
     assert rows_of(problem, make(**soft)) == [0]

@@ -31,12 +31,12 @@ IDLE = replace(
 
 
 def _mission(resources: Resources, horizon: Horizon, *states: State) -> Scenario:
-    places = np.random.default_rng(0).uniform((-60.0, -180.0), (60.0, 180.0), (40, 2)).tolist()
+    sites = np.random.default_rng(0).uniform((-60.0, -180.0), (60.0, 180.0), (40, 2)).tolist()
     return Scenario(
         horizon=horizon,
         satellites=(replace(satellite(orbit()), resources=resources),),
         targets=tuple(
-            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(places)
+            Target(id=f"t{i}", lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(sites)
         ),
         states=states,
     )

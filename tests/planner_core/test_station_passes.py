@@ -12,7 +12,7 @@ from planner_core.access.station_passes import StationPass, overlapping, station
 from planner_core.access.windows import find_accesses
 from planner_core.domain import GroundStation, Horizon
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from tests.geometry import Ground, SkyfieldTable, orbit_from_omm, satellite
 from tests.missions import PAPER_ORBIT
 
@@ -46,12 +46,10 @@ def passes() -> list[StationPass]:
 def test_passes_are_the_accesses(passes: list[StationPass]) -> None:
     wanted = set()
     for index, one in enumerate(SATELLITES):
-        found = find_accesses(
-            propagate(one, DAY), Places.of(STATIONS), Limits.of_stations(STATIONS)
-        )
+        found = find_accesses(propagate(one, DAY), Sites.of(STATIONS), Limits.of_stations(STATIONS))
         wanted |= {
-            (index, int(place), float(start_s), float(end_s))
-            for place, start_s, end_s in zip(found.place, found.start_s, found.end_s, strict=True)
+            (index, int(site), float(start_s), float(end_s))
+            for site, start_s, end_s in zip(found.site, found.start_s, found.end_s, strict=True)
         }
     assert {(one.satellite, one.station, one.aos_s, one.los_s) for one in passes} == wanted
     assert {one.station for one in passes} == {0, 1, 2}

@@ -29,7 +29,7 @@ from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 from planner_core.solvers.priced import better_of, energy_of, is_priced, with_choices
 from planner_core.solvers.registry import SOLVERS, Certified, Milp
-from planner_core.solvers.sequential import Turn
+from planner_core.solvers.sequential import Subproblem
 from tests.examples import examples
 from tests.geometry import orbit, satellite
 from tests.planner_core.brute_force import best_reward
@@ -131,8 +131,8 @@ def test_a_gap_too_short_for_both_turns_charges_nothing() -> None:
 
     def timeline(gap_s: float) -> Timeline:
         tasks = [
-            Task(kind=COLLECT, place=0, start_s=100.0, end_s=130.0),
-            Task(kind=COLLECT, place=1, start_s=130.0 + gap_s, end_s=160.0 + gap_s),
+            Task(kind=COLLECT, site=0, start_s=100.0, end_s=130.0),
+            Task(kind=COLLECT, site=1, start_s=130.0 + gap_s, end_s=160.0 + gap_s),
         ]
         problem = make_problem(tasks, num_targets=2, resources=SLEWING, sun=SOUTH)
         return replay(problem, Plan.of(problem, (0, 1)))
@@ -197,12 +197,12 @@ def test_levels_of_energy_are_never_too_low(seed: int, per_collect: int) -> None
     problem = sunny_problem(seed)
     network = network_of(problem, problem.satellites[0])
     levels = energy_levels(network, per_collect)
-    m = len(network.place)
+    m = len(network.site)
     own, num_own = np.empty((m, levels.width)), np.zeros(m, dtype=np.int64)
     rng = np.random.default_rng(seed)
     prices = rng.uniform(0.0, 0.6, len(problem.target_ids)) * problem.best_worth
     is_contact = network.is_contact == 1
-    price = np.where(is_contact, 0.0, prices[np.where(is_contact, 0, network.place)])
+    price = np.where(is_contact, 0.0, prices[np.where(is_contact, 0, network.site)])
     weight = problem.worth - price
     most, path = most_by_energy(network, levels, weight, own, num_own)
     assert weight[path].sum() == pytest.approx(most)
@@ -292,7 +292,7 @@ def test_energy_paid_for_is_what_the_satellite_lacks_back_at_the_sun(seed: int) 
 def _batches() -> Problem:
     """Return four passes over three images each, of which a battery pays for one pass in two."""
     tasks = [
-        Task(kind=COLLECT, place=3 * p + k, start_s=1000.0 * p + 300 + 60 * k,
+        Task(kind=COLLECT, site=3 * p + k, start_s=1000.0 * p + 300 + 60 * k,
              end_s=1000.0 * p + 330 + 60 * k)
         for p in range(4) for k in range(3)
     ]  # fmt: skip
@@ -318,7 +318,7 @@ def test_a_price_of_energy_batches_images_between_visits_to_the_sun() -> None:
 
 def test_missions_that_charge_in_all_idle_time_are_planned_as_ever() -> None:
     problem = random_problem(7)
-    turn = Turn(
+    turn = Subproblem(
         satellite=problem.satellites[0],
         track=compile_track(problem, problem.satellites[0], np.zeros(10, dtype=np.uint8)),
         collected=np.zeros(5, dtype=np.uint8),

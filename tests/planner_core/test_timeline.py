@@ -21,10 +21,10 @@ from planner_core.referee.timeline import Timeline
 from tests.planner_core.problems import TIGHT, Task, make_problem
 
 
-def collect(place: int, start_s: float, angle_deg: float = 0.0, satellite: int = 0) -> Task:
+def collect(site: int, start_s: float, angle_deg: float = 0.0, satellite: int = 0) -> Task:
     return Task(
         kind=COLLECT,
-        place=place,
+        site=site,
         start_s=start_s,
         end_s=start_s + 30.0,
         angle_deg=angle_deg,
@@ -36,7 +36,7 @@ def collect(place: int, start_s: float, angle_deg: float = 0.0, satellite: int =
 def contact(start_s: float, end_s: float, angle_deg: float = 0.0, satellite: int = 0) -> Task:
     return Task(
         kind=CONTACT,
-        place=0,
+        site=0,
         start_s=start_s,
         end_s=end_s,
         angle_deg=angle_deg,

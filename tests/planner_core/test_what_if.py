@@ -76,10 +76,10 @@ def instant(plan: Judged, offset_s: float) -> datetime:
 
 def name_of(plan: Judged, action: JudgedAction) -> dict[str, Any]:
     assert action.opportunity is not None
-    place = int(plan.problem.opportunities.place[action.opportunity])
+    site = int(plan.problem.opportunities.site[action.opportunity])
     if action.mode == "collect":
-        return {"target_id": plan.problem.target_ids[place]}
-    return {"station_id": plan.problem.station_ids[place]}
+        return {"target_id": plan.problem.target_ids[site]}
+    return {"station_id": plan.problem.station_ids[site]}
 
 
 def view_of(plan: Judged) -> PlanView:
@@ -99,7 +99,7 @@ def test_every_solver_keeps_what_a_mission_pins(solver: str, dynamics: Dynamics)
     )
     assert left_out is not None
     table = plan.problem.opportunities
-    promised = plan.problem.target_ids[int(table.place[left_out])]
+    promised = plan.problem.target_ids[int(table.site[left_out])]
     collected = [a for a in actions_of(plan) if a.reward > 0.0]
     quiet_s = 4.0 * 3600.0
     pins = Pins(
@@ -163,7 +163,7 @@ def test_a_pin_that_means_nothing_is_refused_by_name(
     keep: dict[str, Any], code: str, words: str
 ) -> None:
     scenario, table = mission(), computed().opportunities
-    counts = np.bincount(table.place[table.kind == COLLECT])
+    counts = np.bincount(table.site[table.kind == COLLECT])
     several = scenario.targets[int(np.flatnonzero(counts > 1)[0])].id
     pin: dict[str, Any] = {name: several if value == "T" else value for name, value in keep.items()}
     if "start" in pin:
@@ -186,9 +186,9 @@ def test_images_that_the_battery_cannot_bear_are_refused_at_the_first_of_them() 
     seen: set[int] = set()
     for row in collects.tolist():
         is_clear = not chain or table.start_s[row] > table.end_s[chain[-1]] + 190.0
-        if is_clear and int(table.place[row]) not in seen:
+        if is_clear and int(table.site[row]) not in seen:
             chain.append(row)
-            seen.add(int(table.place[row]))
+            seen.add(int(table.site[row]))
     (satellite,) = mission().satellites
     weak = replace(satellite.resources, collect_drain_per_s=1 / 250.0, sunpoint_charge_per_s=1e-6)
     scenario = replace(
@@ -227,8 +227,8 @@ def test_a_forced_target_is_taken_and_a_forbidden_one_is_not() -> None:
     starts = [a.start_s for a in actions_of(other) if a.mode == "contact"]
     assert contact.start_s not in starts
     diff = plan_diff(view_of(plan), view_of(other))
-    assert ids[displaced.target] in {a.place_id for a in diff.added}
-    assert ids[collected.target] in {a.place_id for a in diff.removed}
+    assert ids[displaced.target] in {a.site_id for a in diff.added}
+    assert ids[collected.target] in {a.site_id for a in diff.removed}
     assert plan_diff(view_of(plan), view_of(plan)).is_empty
     assert diff.totals["reward"] == pytest.approx(other.timeline.reward - plan.timeline.reward)
 

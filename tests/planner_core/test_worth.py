@@ -56,7 +56,7 @@ def test_collects_are_worth_reward_times_quality() -> None:
     table = problem.opportunities
     assert len(table) > 20
     assert np.all(table.kind == COLLECT)
-    reward = np.array([target.reward for target in asked.targets])[table.place]
+    reward = np.array([target.reward for target in asked.targets])[table.site]
     by_angle = np.interp(table.off_nadir_deg, *np.transpose(OFF_NADIR))
     by_light = np.interp(table.sun_elevation_deg, *np.transpose(LIGHT))
     assert problem.worth == pytest.approx(reward * by_angle * by_light)

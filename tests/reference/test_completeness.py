@@ -26,7 +26,7 @@ from planner_core.domain import (
     Target,
 )
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from tests.brute_force_windows import BruteForce, Comparison
 from tests.examples import examples
 from tests.geometry import Ground, SkyfieldTable, hours, off_nadir_deg, orbit, satellite
@@ -34,12 +34,12 @@ from tests.geometry import Ground, SkyfieldTable, hours, off_nadir_deg, orbit, s
 
 def landsat_targets(folder: Path) -> list[Target]:
     """Return the distinct real scene centres of both files, 3,829 of them."""
-    places: dict[tuple[float, float], None] = {}
+    sites: dict[tuple[float, float], None] = {}
     for name in ("landsat_dev_half.csv", "landsat_1200.csv"):
         with (folder / "targets" / name).open() as file:
             rows = csv.DictReader(file)
-            places |= dict.fromkeys((float(row["lat"]), float(row["lon"])) for row in rows)
-    return [Target(id=str(i), lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(places)]
+            sites |= dict.fromkeys((float(row["lat"]), float(row["lon"])) for row in rows)
+    return [Target(id=str(i), lat_deg=lat, lon_deg=lon) for i, (lat, lon) in enumerate(sites)]
 
 
 def spread_targets(count: int) -> list[Target]:
@@ -59,8 +59,8 @@ def compare(
     elements: OrbitElements, sensor: Sensor, targets: list[Target], horizon: Horizon
 ) -> Comparison:
     path = propagate(satellite(elements, sensor=sensor), horizon)
-    found = find_accesses(path, Places.of(targets), Limits.of_targets(sensor, targets))
-    first = np.searchsorted(found.place, np.arange(len(targets) + 1))
+    found = find_accesses(path, Sites.of(targets), Limits.of_targets(sensor, targets))
+    first = np.searchsorted(found.site, np.arange(len(targets) + 1))
     brute = BruteForce(skyfield_table(elements, horizon), sensor)
     comparison = Comparison()
     for index, one in enumerate(targets):
@@ -170,17 +170,17 @@ def test_grazing_passes_between_two_nodes_are_found_by_name() -> None:
     path = propagate(satellite(elements), day)
     wide = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=89.0)
     targets = spread_targets(40)
-    found = find_accesses(path, Places.of(targets), Limits.of_targets(wide, targets))
+    found = find_accesses(path, Sites.of(targets), Limits.of_targets(wide, targets))
     num_short = 0
     for row in range(0, len(found), 5):
-        one = targets[found.place[row]]
+        one = targets[found.site[row]]
         t = np.linspace(found.start_s[row], found.end_s[row], 2001)
         ground = Ground.at(one.lat_deg, one.lon_deg)
         least = float(off_nadir_deg(path.state_itrf(t)[0], ground, "geodetic").min())
         grazing = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=least + 2e-3)
         result = compare(elements, grazing, [one], day)
         assert (result.missing, result.extra) == (0, 0)
-        here = find_accesses(path, Places.of([one]), Limits.of_targets(grazing, [one]))
+        here = find_accesses(path, Sites.of([one]), Limits.of_targets(grazing, [one]))
         length_s = here.end_s - here.start_s
         num_short += int((length_s < 60.0).sum())
         assert ((here.start_s >= found.start_s[row]) & (here.end_s <= found.end_s[row])).any()

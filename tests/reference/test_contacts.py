@@ -17,7 +17,7 @@ from planner_core.access.limits import Limits
 from planner_core.access.windows import find_accesses
 from planner_core.domain import GroundStation, Horizon
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from tests.geometry import orbit_from_omm, satellite
 
 DAY = Horizon(start=datetime(2022, 8, 16, tzinfo=UTC), end=datetime(2022, 8, 17, tzinfo=UTC))
@@ -54,9 +54,9 @@ def found_contacts(folder: Path) -> Windows:
     for record in json.loads((folder / "omm/derived_eo_2022-08-15.json").read_text()):
         name = record["OBJECT_NAME"]
         path = propagate(satellite(orbit_from_omm(record), name=name), DAY)
-        found = find_accesses(path, Places.of(ground), Limits.of_stations(ground))
-        for place, start, end in zip(found.place, found.start_s, found.end_s, strict=True):
-            contacts[name, ground[place].id].append((float(start), float(end)))
+        found = find_accesses(path, Sites.of(ground), Limits.of_stations(ground))
+        for site, start, end in zip(found.site, found.start_s, found.end_s, strict=True):
+            contacts[name, ground[site].id].append((float(start), float(end)))
     return contacts
 
 

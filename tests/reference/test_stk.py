@@ -15,7 +15,7 @@ from planner_core.access.limits import Limits
 from planner_core.access.windows import find_accesses
 from planner_core.domain import GroundStation
 from planner_core.orbits.ephemeris import propagate
-from planner_core.orbits.places import Places
+from planner_core.orbits.sites import Sites
 from tests.geometry import hours, orbit, satellite
 
 STK = """
@@ -49,7 +49,7 @@ def test_contacts_agree_with_stk_within_15_ms_in_the_median() -> None:
         id="svalbard", name="", lat_deg=78.230306, lon_deg=15.396518, min_elevation_deg=0.0
     )
     path = propagate(satellite(elements), hours(24, start))
-    found = find_accesses(path, Places.of([svalbard]), Limits.of_stations([svalbard]))
+    found = find_accesses(path, Sites.of([svalbard]), Limits.of_stations([svalbard]))
     expected = np.array([seconds(clock) for clock in STK.split()]).reshape(-1, 2)
     assert len(found) == 15
     errors_s = np.stack([found.start_s, found.end_s], axis=1) - expected

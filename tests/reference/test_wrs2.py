@@ -29,11 +29,11 @@ EARTH_RADIUS_M = 6_371_000.0
 @pytest.fixture(scope="module")
 def real_centers_deg(shared_data: Path) -> Floats:
     """Return the distinct real scene centres at hand, latitude and longitude, ``(n, 2)``."""
-    places = set()
+    sites = set()
     for name in ("landsat_1200.csv", "landsat_dev_half.csv"):
         with (shared_data / "targets" / name).open(encoding="utf-8") as file:
-            places |= {(float(row["lat"]), float(row["lon"])) for row in csv.DictReader(file)}
-    return np.array(sorted(places))
+            sites |= {(float(row["lat"]), float(row["lon"])) for row in csv.DictReader(file)}
+    return np.array(sorted(sites))
 
 
 def _unit(lat_deg: Floats, lon_deg: Floats) -> Floats:
@@ -44,9 +44,9 @@ def _unit(lat_deg: Floats, lon_deg: Floats) -> Floats:
 def _nearest_m(places_deg: Floats, lat_deg: Floats, lon_deg: Floats) -> Floats:
     """Return the distance from each place to the nearest of the other points."""
     centers = _unit(lat_deg, lon_deg)
-    places = _unit(places_deg[:, 0], places_deg[:, 1])
-    nearest: npt.NDArray[np.intp] = np.array([int((centers @ place).argmax()) for place in places])
-    apart: Floats = np.linalg.norm(places - centers[nearest], axis=1)
+    sites = _unit(places_deg[:, 0], places_deg[:, 1])
+    nearest: npt.NDArray[np.intp] = np.array([int((centers @ site).argmax()) for site in sites])
+    apart: Floats = np.linalg.norm(sites - centers[nearest], axis=1)
     return EARTH_RADIUS_M * apart
 
 

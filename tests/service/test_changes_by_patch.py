@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx
 
-from service.wire.places import GroundStationIn, GroundStationPatch
+from service.wire.sites import GroundStationIn, GroundStationPatch
 from tests.service.conftest import Service
 from tests.service.factories import ground_station, post, satellite, send, target
 from tests.service.problems import assert_problem

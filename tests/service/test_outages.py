@@ -78,7 +78,7 @@ def test_a_skip_over_a_span_skips_all_it_touches() -> None:
     def contacts(**pins: object) -> list[tuple[str, str]]:
         scenario = scenario_from_content(file | ({"pins": pins} if pins else {}))
         table = build_problem(scenario, computed, budget).opportunities
-        rows = np.flatnonzero((table.kind == CONTACT) & (table.place == 0))
+        rows = np.flatnonzero((table.kind == CONTACT) & (table.site == 0))
         return [
             (instant_text(scenario.horizon.instant(table.start_s[row])),
              instant_text(scenario.horizon.instant(table.end_s[row])))

@@ -195,9 +195,9 @@ def test_every_part_of_a_proof_is_declared() -> None:
     given = Bound(
         value=3.5,
         proof="dp",
-        prices=np.array([0.5, 1.0]),
-        contact_prices=np.array([2.0]),
-        antenna_prices=np.array([0.25, 0.0]),
+        multipliers=np.array([0.5, 1.0]),
+        contact_multipliers=np.array([2.0]),
+        antenna_multipliers=np.array([0.25, 0.0]),
         queue_levels=12,
         is_elementary=True,
         unit=0.5,

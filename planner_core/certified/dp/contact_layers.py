@@ -59,7 +59,7 @@ def layers_of(network: Network) -> Layers:
     contact = np.flatnonzero(network.is_contact).astype(np.int32)
     num_groups = min(len(contact), MAX_LAYERS)
     first = (np.arange(num_groups + 1) * len(contact)) // max(1, num_groups)
-    group = np.full(len(network.place), -1, dtype=np.int32)
+    group = np.full(len(network.site), -1, dtype=np.int32)
     number = group.copy()
     group[contact] = np.repeat(np.arange(num_groups), np.diff(first))
     number[contact] = np.arange(len(contact))

@@ -1,7 +1,7 @@
 """The most that one satellite can gain under its recorder alone: worth exact, data in levels.
 
 ``most_value`` knows the battery as well, and counts worth in whole units. Without a battery one
-number is left of each level, so that prices can be tried by the hundred.
+number is left of each level, so that multipliers can be tried by the hundred.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     tasks add is rounded down, and so is an empty recorder. Others are never below. (A task may
     be off by a millionth of a level; limits leave room for that.)
     """
-    m = len(network.place)
+    m = len(network.site)
     is_filling = network.data_gain > 0.0
     lowest = min(0.0, float(network.data_floor.min(initial=0.0)))
     highest = max(

@@ -73,7 +73,7 @@ def memory_of(problem: Problem, network: ArcNetwork) -> Memory:
     table, rows = problem.opportunities, network.row
     nodes = np.arange(len(rows))
     part = np.searchsorted(network.first, nodes, side="right")
-    view = part * (len(problem.target_ids) + 1) + network.place
+    view = part * (len(problem.target_ids) + 1) + network.site
     _, first, group = np.unique(view, return_index=True, return_inverse=True)
     last = np.zeros(len(first), dtype=np.int64)
     np.maximum.at(last, group, nodes)
@@ -371,20 +371,20 @@ def elementary_paths(
         total += value
         while at >= 0:
             if labels.is_paid[at]:
-                counts[network.place[at]] += 1
+                counts[network.site[at]] += 1
             at = labels.previous[at]
     return total
 
 
-def elementary_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
-    """Return the bound that prices of targets prove, and how often its paths take each target.
+def elementary_value(problem: Problem, multipliers: Floats) -> tuple[float, Ints]:
+    """Return the bound that multipliers of targets prove, and how often its paths take each target.
 
     This is the whole proof, as ``lagrangian_value`` is that of the plain bound.
     """
     network = arc_network_of(problem)
     memory = memory_of(problem, network)
-    price = np.append(surplus(prices, problem.best_worth), 0.0)
-    weight = weights(problem.worth[network.row], price[network.place])
-    counts = np.zeros(len(price), dtype=np.int32)
+    multiplier = np.append(surplus(multipliers, problem.best_worth), 0.0)
+    weight = weights(problem.worth[network.row], multiplier[network.site])
+    counts = np.zeros(len(multiplier), dtype=np.int32)
     total = elementary_paths(network, memory, weight, labels_for(network, memory), counts)
-    return float(price.sum() + total), counts[:-1]
+    return float(multiplier.sum() + total), counts[:-1]

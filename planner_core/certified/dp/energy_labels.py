@@ -1,7 +1,7 @@
 """The most that one satellite can gain under its battery alone: worth exact, energy in levels.
 
 ``most_value`` counts worth in whole units and knows energy exactly; here it is the other way
-round, and the recorder is left out. That takes a fraction of the time, so that prices can be
+round, and the recorder is left out. That takes a fraction of the time, so that multipliers can be
 tried by the hundred. For a proof energy is rounded in favour of the satellite, so that no plan is
 lost; a search for multipliers needs only an estimate.
 """

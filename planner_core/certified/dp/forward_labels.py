@@ -1,6 +1,6 @@
 """The most that one satellite can gain under battery and recorder: forward, exact in energy.
 
-At-most-once rows are left out: a target's worth is what its price leaves, and may be gained
+At-most-once rows are left out: a target's worth is what its multiplier leaves, and may be gained
 again and again. For each whole value and data level only the most energy matters.
 """
 
@@ -301,7 +301,7 @@ def _leads_to(
     energy_after: float,
 ) -> bool:
     """Return whether task ``k`` (or the end, at m) makes the later label of the earlier one."""
-    if k == len(network.place):
+    if k == len(network.site):
         return level <= level_after
     if level > levels.before[k]:
         return False

@@ -13,10 +13,10 @@ from planner_core.certified.dp.queue_tables import (
     Idle,
     Queues,
     Tables,
+    index_of,
     level_after,
     level_of,
     num_listed_of,
-    place_of,
     stretch_of,
     top_of,
 )
@@ -93,7 +93,7 @@ def _at_start(q: Queues, layer: int, source: int, begin: int, end: int) -> Idle:
     if begin == 0 and source < 0 and q.first[layer] < 0 and energy.start >= base:
         x = min(energy.start - base, width - 1)
         for promised in range(1, 1 + (q.num_classes if q.data.start >= top else 1)):
-            at = place_of(q, top, q.data.start, promised)
+            at = index_of(q, top, q.data.start, promised)
             idle.units[at, x] = 0
             idle.span[at, 0], idle.span[at, 1] = x, x + 1
             idle.reached[0] = min(idle.reached[0], at)
@@ -178,7 +178,7 @@ def _take(
                 further = after[min(end + up, most) - 1]
             last = q.num_classes if promised == 0 and to >= top else max(promised, 1)
             for other in range(max(promised, 1), last + 1):
-                target = place_of(q, top, to, other)
+                target = index_of(q, top, to, other)
                 if is_end:
                     target = to + promised * data.num_levels
                 if earned[target] == UNKNOWN_UNITS:
@@ -284,7 +284,7 @@ def _spread(q: Queues, tables: Tables, k: int, top: int) -> None:
     """List the higher levels of a table once for each promise."""
     slot, beyond = k % len(tables.own), q.data.num_levels - top
     for promised in range(2, q.num_classes + 1):
-        first = place_of(q, top, top, promised)
+        first = index_of(q, top, top, promised)
         for y in range(beyond):
             tables.own[slot, first + y] = tables.own[slot, top + y]
             tables.span[slot, first + y] = tables.span[slot, top + y]

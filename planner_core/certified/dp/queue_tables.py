@@ -24,7 +24,7 @@ class Fixing(NamedTuple):
         Those of ``contact_layers``, each contact with a layer of its own, and what tasks are worth
         in them. The latter of shape ``(num_contacts + 1, m)``, ``(0, 0)`` where nothing is fixed.
     toll
-        The price of each contact, by volume. Shape ``(num_contacts,)``.
+        The multiplier of each contact, by volume. Shape ``(num_contacts,)``.
     after_contact
         The most that may follow each contact, by energy. Shape ``(num_contacts, width)``.
     least
@@ -67,7 +67,7 @@ class Queues(NamedTuple):
     end_s, on_board, decaying, most
         When each task ends, and what it earns on board, by how much more if it is down at
         once, and at most.
-    price
+    multiplier
         What each costs.
     unit
         Of worth.
@@ -94,7 +94,7 @@ class Queues(NamedTuple):
     on_board: Floats
     decaying: Floats
     most: Floats
-    price: Floats
+    multiplier: Floats
     half_life_s: float
     unit: float
     num_tables: int
@@ -190,7 +190,7 @@ def level_of(q: Queues, top: int, listed: int) -> tuple[int, int]:
 
 
 @inlined
-def place_of(q: Queues, top: int, level: int, promised: int) -> int:
+def index_of(q: Queues, top: int, level: int, promised: int) -> int:
     """Return where a level of data is listed with a promise."""
     if level < top:
         return level

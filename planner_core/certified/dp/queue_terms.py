@@ -25,7 +25,7 @@ def queues_of(
     problem: Problem,
     satellite: SatelliteProblem,
     network: Network,
-    price: Floats,
+    multiplier: Floats,
     *,
     per_collect: int,
     num_classes: int,
@@ -43,7 +43,7 @@ def queues_of(
     ----------
     network
         Its network, relaxed or strict as the programme is.
-    price
+    multiplier
         Of each target. Shape ``(num_targets,)``.
     per_collect
         How many levels of energy the cheapest collect takes.
@@ -81,7 +81,7 @@ def queues_of(
     num_done = _num_extensions(network, contact, first)
     if width * num_done > MAX_QUEUE_WORK or width * num_kept > MAX_QUEUE_ENTRIES:
         return None
-    volume, place = satellite.volume[rows[contact]] + DOWN, satellite.place[rows]
+    volume, site = satellite.volume[rows[contact]] + DOWN, satellite.site[rows]
     step = _step_of(data, volume)
     return Queues(
         network=network,
@@ -101,7 +101,7 @@ def queues_of(
         on_board=np.where(is_image, on_board, 0.0),
         decaying=np.where(is_image, problem.worth_on_ground[table_rows] - on_board, 0.0),
         most=problem.worth[table_rows],
-        price=np.where(is_image, np.append(price, 0.0)[place * is_image], 0.0),
+        multiplier=np.where(is_image, np.append(multiplier, 0.0)[site * is_image], 0.0),
         half_life_s=float(problem.objective.half_life_s or np.inf),
         unit=max(float(problem.worth[table_rows].sum()), 1e-9) / MAX_UNITS,
         num_tables=num_tables,
@@ -124,7 +124,7 @@ def _step_of(data: DataLevels, volume: Floats) -> float:
 
 def _ready_s(problem: Problem, satellite: SatelliteProblem, contacts: Ints) -> Floats:
     """Return from when on contacts take down data. Shape ``(num_contacts,)``."""
-    setup_s = problem.downlinks.stations.setup_s[satellite.place[contacts]]
+    setup_s = problem.downlinks.stations.setup_s[satellite.site[contacts]]
     ready_s: Floats = satellite.start_s[contacts] + setup_s
     return ready_s
 
@@ -143,13 +143,13 @@ def _nothing_fixed(network: Network) -> Fixing:
 def _must_follow(network: Network, contact: Ints) -> Ints:
     """Return for each layer the contact that a path must take before its own; -1 for none."""
     kept = np.flatnonzero(np.append(network.is_kept[contact], False))
-    places = np.searchsorted(kept, np.arange(len(contact) + 1))
-    return np.append(-1, kept)[places].astype(np.int32)
+    position = np.searchsorted(kept, np.arange(len(contact) + 1))
+    return np.append(-1, kept)[position].astype(np.int32)
 
 
 def _num_extensions(network: Network, contact: Ints, first: Ints) -> float:
     """Return how often paths are extended by a task, about, in all layers together."""
-    m = len(network.place)
+    m = len(network.site)
     begins = np.append(0, contact)[first + 1]
     num_tasks = int((np.append(contact, m) - begins).sum())
     return num_tasks * (2.0 + len(network.straight_rows) / max(1, m))
@@ -170,7 +170,7 @@ def _down_s(
         fits = amounts <= volume[at]
         passing = links.passes.get(int(access[at]))
         if passing is None:
-            gain = float(links.stations.gain[satellite.place[row]])
+            gain = float(links.stations.gain[satellite.site[row]])
             rate_per_s = satellite.resources.downlink_per_s * gain
             found[at, fits] = ready_s + amounts[fits] / max(rate_per_s, 1e-12)
         else:

@@ -25,7 +25,7 @@ def know(q: Queues, k: int, layer: int, at: int, earned: Ints, needed: Floats) -
     if q.number[k] < 0:
         down_s = _down_s(q, layer, promised, max(0.0, q.data.least[level] + q.queued[k]))
         worth = q.decaying[k] * 2.0 ** (-max(down_s - q.end_s[k], 0.0) / q.half_life_s)
-        worth = min(q.on_board[k] + worth, q.most[k]) - q.price[k]
+        worth = min(q.on_board[k] + worth, q.most[k]) - q.multiplier[k]
         if worth > 0.0:
             earned[at] = int(np.ceil(worth / q.unit - LEVEL))
         elif not (q.takes_worthless or q.network.is_kept[k]):
@@ -37,7 +37,7 @@ def know(q: Queues, k: int, layer: int, at: int, earned: Ints, needed: Floats) -
 
 @inlined
 def _taken_up(q: Queues, layer: int, is_end: bool, promised: int, amount: float) -> float:
-    """Return the prices of contacts for what is on board and has to come down in them."""
+    """Return the multipliers of contacts for what is on board and has to come down in them."""
     paid = 0.0
     if not is_end and layer < len(q.contact):
         first = min(amount, q.volume[layer] - DOWN)

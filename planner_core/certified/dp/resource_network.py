@@ -69,7 +69,7 @@ class Network(NamedTuple):
     holds at the end costs ``left_cost``, of worth for a full one.
     """
 
-    place: Ints
+    site: Ints
     is_contact: np.ndarray
     is_kept: np.ndarray
     idle_from: Ints
@@ -153,7 +153,7 @@ def _without_worth(problem: Problem, satellite: SatelliteProblem, slack: float) 
     spent = track.telemetry_per_s * (track.data_from_s - track.data_to_s)
     top = track.recorder_max + slack
     return Network(
-        place=satellite.place,
+        site=satellite.site,
         is_contact=(satellite.kind == CONTACT).astype(np.uint8),
         is_kept=np.zeros(len(satellite), dtype=np.bool_),
         idle_from=idle_from,
@@ -310,7 +310,7 @@ def part_of(network: Network, rows: Ints) -> Network:
     of_rows = {
         name: getattr(network, name)[rows]
         for name in (
-            "place", "is_contact", "is_kept", "energy_from", "energy_to", "energy_cap",
+            "site", "is_contact", "is_kept", "energy_from", "energy_to", "energy_cap",
             "energy_cost", "energy_floor", "data_gain", "data_floor", "data_before", "data_after",
             "delivered",
         )
@@ -333,7 +333,7 @@ def part_of(network: Network, rows: Ints) -> Network:
 def _arcs_among(network: Network, rows: Ints) -> tuple[Longs, Ints, Floats]:
     """Return the arcs among some rows, and what they give back."""
     m = len(rows)
-    new_row = np.empty(len(network.place), dtype=np.int32)
+    new_row = np.empty(len(network.site), dtype=np.int32)
     for row in range(len(new_row)):
         new_row[row] = -1
     for new in range(m):

@@ -16,8 +16,8 @@ import numpy.typing as npt
 from planner_core.bundles import bundle
 from planner_core.certified.sizes import OPENING_LEVELS
 from planner_core.jit import kernel
-from planner_core.precedence.earliest_starts import Arrivals, arrivals_of
-from planner_core.precedence.time_windows import Spans, View
+from planner_core.precedence.earliest_starts import EarliestStarts, earliest_starts_of
+from planner_core.precedence.time_windows import TimeWindows, View
 from planner_core.problem import Ints
 from planner_core.problem.pointing import Agile, needed_s, position_m, sight
 from planner_core.problem.slew import INSTANT, angle_between_deg, slew_s
@@ -47,9 +47,9 @@ class Cells(NamedTuple):
         How much later a chain may start that leaves out its next task.
     """
 
-    spans: Spans
+    spans: TimeWindows
     eye: View
-    arrivals: Arrivals
+    earliest: EarliestStarts
     order: Ints
     task: Ints
     bit: Masks
@@ -59,7 +59,7 @@ class Cells(NamedTuple):
     spare_s: float
 
 
-def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
+def cells_of(spans: TimeWindows, view: View, width_s: float) -> Cells | None:
     """Return a satellite's cells; None where it turns more slowly than lines of sight do.
 
     An acceleration limit only makes turns longer: here it is left out, for with it a later
@@ -70,18 +70,18 @@ def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
     if share >= 1.0:
         return None
     least_s = float(spans.length_s.min()) if len(spans.row) else 1.0
-    arrivals = arrivals_of(spans, view, min(width_s, 0.9 * least_s))
-    count = np.diff(arrivals.first_cell)
+    earliest = earliest_starts_of(spans, view, min(width_s, 0.9 * least_s))
+    count = np.diff(earliest.first_cell)
     task = np.repeat(np.arange(len(spans.row), dtype=np.int32), count)
-    edge_s = spans.open_s[task] + arrivals.width_s * (
-        np.arange(len(task)) - arrivals.first_cell[task]
+    edge_s = spans.open_s[task] + earliest.width_s * (
+        np.arange(len(task)) - earliest.first_cell[task]
     )
     bit = _bits(spans)
     num_seconds = int((spans.close_s + spans.length_s).max(initial=0.0)) + 2
     return Cells(
         spans=spans,
         eye=view,
-        arrivals=arrivals,
+        earliest=earliest,
         order=np.argsort(edge_s, kind="stable").astype(np.int32),
         task=task,
         bit=bit,
@@ -93,7 +93,7 @@ def cells_of(spans: Spans, view: View, width_s: float) -> Cells | None:
 
 
 @kernel
-def greatest_rate_deg_s(spans: Spans, view: View) -> float:
+def greatest_rate_deg_s(spans: TimeWindows, view: View) -> float:
     """Return a rate that the lines of sight of tasks never exceed.
 
     The mean rate of each second, and what the rate can gain within one: the second derivative
@@ -103,16 +103,16 @@ def greatest_rate_deg_s(spans: Spans, view: View) -> float:
     for i in range(len(spans.open_s)):
         t_s = spans.open_s[i]
         end_s = spans.close_s[i] + spans.length_s[i]
-        place = spans.place[i]
-        before = sight(view.path, view.places_m, place, t_s)
+        site = spans.site[i]
+        before = sight(view.path, view.sites_m, site, t_s)
         while t_s < end_s:
             t_s += 1.0
-            now = sight(view.path, view.places_m, place, t_s)
+            now = sight(view.path, view.sites_m, site, t_s)
             x, y, z = position_m(view.path, t_s)
             x, y, z = (
-                x - view.places_m[place, 0],
-                y - view.places_m[place, 1],
-                z - view.places_m[place, 2],
+                x - view.sites_m[site, 0],
+                y - view.sites_m[site, 1],
+                z - view.sites_m[site, 2],
             )
             rate = math.radians(angle_between_deg(before, now))
             gain = 3.0 * rate * rate + 25.0 / math.sqrt(x * x + y * y + z * z)
@@ -122,7 +122,7 @@ def greatest_rate_deg_s(spans: Spans, view: View) -> float:
 
 
 @kernel
-def _bits(spans: Spans) -> Masks:
+def _bits(spans: TimeWindows) -> Masks:
     """Give each task a bit that no other one has while both accesses are open."""
     bit = np.zeros(len(spans.open_s), dtype=np.uint64)
     free_s = np.full(64, -np.inf)
@@ -137,7 +137,7 @@ def _bits(spans: Spans) -> Masks:
 
 
 @kernel
-def _opened(spans: Spans, bit: Masks, num_seconds: int) -> Masks:
+def _opened(spans: TimeWindows, bit: Masks, num_seconds: int) -> Masks:
     opened = np.zeros((OPENING_LEVELS, num_seconds), dtype=np.uint64)
     for i in range(len(spans.open_s)):
         opened[0, int(spans.open_s[i])] |= bit[i]
@@ -150,7 +150,7 @@ def _opened(spans: Spans, bit: Masks, num_seconds: int) -> Masks:
 
 
 @kernel
-def _alive(spans: Spans, bit: Masks, num_seconds: int) -> Masks:
+def _alive(spans: TimeWindows, bit: Masks, num_seconds: int) -> Masks:
     alive = np.zeros(num_seconds, dtype=np.uint64)
     for i in range(len(spans.open_s)):
         for t in range(int(spans.open_s[i]), int(spans.close_s[i]) + 1):
@@ -159,7 +159,7 @@ def _alive(spans: Spans, bit: Masks, num_seconds: int) -> Masks:
 
 
 @kernel
-def _first_tasks(spans: Spans, view: View) -> npt.NDArray[np.bool_]:
+def _first_tasks(spans: TimeWindows, view: View) -> npt.NDArray[np.bool_]:
     """Return which tasks no other one can precede; a chain may begin with those alone."""
     n = len(spans.open_s)
     is_first = np.ones(n, dtype=np.bool_)
@@ -170,10 +170,10 @@ def _first_tasks(spans: Spans, view: View) -> npt.NDArray[np.bool_]:
         if spans.open_s[b] >= far_s:
             is_first[b:] = False
             break
-        looks = sight(view.path, view.places_m, spans.place[b], spans.open_s[b])
+        looks = sight(view.path, view.sites_m, spans.site[b], spans.open_s[b])
         for a in range(b):
             end_s = spans.open_s[a] + spans.length_s[a]
-            looked = sight(view.path, view.places_m, spans.place[a], end_s)
+            looked = sight(view.path, view.sites_m, spans.site[a], end_s)
             if end_s + needed_s(agile, looked, looks) <= spans.open_s[b]:
                 is_first[b] = False
                 break

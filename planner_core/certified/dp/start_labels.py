@@ -2,8 +2,8 @@ r"""The heaviest path of one satellite when starts are free: labels over cells o
 
 A label at a cell of a task says: some chain of tasks that ends with this one, begun at
 ``start_s`` or later in this cell, is worth at most ``value``, and holds at least the tasks in
-``mask`` whose accesses are still open. Labels go on to the tasks of the table of arrivals. Each
-step only errs on one side:
+``mask`` whose accesses are still open. Labels go on to the tasks of the table of earliest starts.
+Each step only errs on one side:
 
 * A label is left out only where another one is at least as good: it is worth as much, without
   the tasks that it alone remembers, and starts no later. Or it starts later by no more than
@@ -40,9 +40,9 @@ _ALL: Final = np.uint64(0xFFFF_FFFF_FFFF_FFFF)
 _ONE: Final = np.uint64(1)
 _DE_BRUIJN: Final = np.uint64(0x03F7_9D71_B4CB_0A89)
 _SHIFT: Final = np.uint64(58)
-_PLACE_OF_BIT: Final[Ints] = np.zeros(64, dtype=np.int32)
+_NUMBER_OF_BIT: Final[Ints] = np.zeros(64, dtype=np.int32)
 for _bit in range(64):
-    _PLACE_OF_BIT[(((1 << _bit) * int(_DE_BRUIJN)) & int(_ALL)) >> 58] = _bit
+    _NUMBER_OF_BIT[(((1 << _bit) * int(_DE_BRUIJN)) & int(_ALL)) >> 58] = _bit
 _PER_TASK_S: Final = TUNING.tidy_s
 
 
@@ -88,8 +88,8 @@ def heaviest(
     is_exact
         Otherwise arrivals are estimates, which is quick and no bound.
     """
-    spans, view, arrivals = cells.spans, cells.eye, cells.arrivals
-    width_s = arrivals.width_s
+    spans, view, earliest = cells.spans, cells.eye, cells.earliest
+    width_s = earliest.width_s
     top, heaviest_task = 0.0, 0.0
     best = -1
     for i in range(len(weight)):
@@ -100,29 +100,29 @@ def heaviest(
     for task in range(len(weight)):
         if cells.is_first[task]:
             _insert(
-                cells, labels, most, scale, arrivals.first_cell[task],
+                cells, labels, most, scale, earliest.first_cell[task],
                 weight[task], spans.open_s[task], cells.bit[task], -1, True,
             )  # fmt: skip
     next_open = 0
     for at in range(len(cells.order)):
         cell = cells.order[at]
         task = cells.task[cell]
-        edge = spans.open_s[task] + (cell - arrivals.first_cell[task]) * width_s
+        edge = spans.open_s[task] + (cell - earliest.first_cell[task]) * width_s
         # The task that each bit stands for, in the cells that lie ahead.
         while next_open < len(weight) and spans.open_s[next_open] <= edge + width_s:
             if cells.bit[next_open] != _NONE:
-                labels.bit_weight[_place_of(cells.bit[next_open])] = weight[next_open]
+                labels.bit_weight[_number_of(cells.bit[next_open])] = weight[next_open]
             next_open += 1
         for slot in range(cell * most, cell * most + labels.used[cell]):
             value, start_s = labels.value[slot], labels.start_s[slot]
             if value > top:
                 top, best = value, slot
             end_s = start_s + spans.length_s[task]
-            looked = sight(view.path, view.places_m, spans.place[task], end_s)
-            for arc in range(arrivals.first_arc[cell], arrivals.first_arc[cell + 1]):
-                other = arrivals.to[arc]
-                then_s = max(edge + arrivals.after_s[arc], spans.open_s[other])
-                into = cell_of(arrivals, spans, other, then_s)
+            looked = sight(view.path, view.sites_m, spans.site[task], end_s)
+            for arc in range(earliest.first_arc[cell], earliest.first_arc[cell + 1]):
+                other = earliest.to[arc]
+                then_s = max(edge + earliest.after_s[arc], spans.open_s[other])
+                into = cell_of(earliest, spans, other, then_s)
                 mask = _left_open(cells, labels.mask[slot], edge + width_s, into, other)
                 bit = cells.bit[other]
                 is_paid = mask & bit == _NONE
@@ -130,13 +130,13 @@ def heaviest(
                 if _is_covered(cells, labels, most, heaviest_task, into, worth, then_s, mask | bit):
                     continue
                 if start_s > edge:
-                    guess_s = edge + arrivals.after_s[arc] + arrivals.slope[arc] * (start_s - edge)
+                    guess_s = edge + earliest.after_s[arc] + earliest.slope[arc] * (start_s - edge)
                     if is_exact:
                         guess_s = _not_after_s(cells, end_s, looked, other, guess_s)
                     if guess_s > spans.close_s[other]:
                         continue
                     then_s = max(then_s, guess_s)
-                    again = cell_of(arrivals, spans, other, then_s)
+                    again = cell_of(earliest, spans, other, then_s)
                     if again != into:
                         into = again
                         mask = _left_open(cells, labels.mask[slot], edge + width_s, into, other)
@@ -160,12 +160,12 @@ def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s:
     guess_s -= EARLIER_S
     if guess_s <= first_s:
         return float(first_s)
-    looks = sight(eye.path, eye.places_m, spans.place[task], guess_s)
+    looks = sight(eye.path, eye.sites_m, spans.site[task], guess_s)
     if guess_s < end_s + needed_s(eye.agile, looked, looks):
         return guess_s
     exact_s: float = earliest_start_s(
-        eye.agile, end_s, looked, eye.path, eye.places_m,
-        spans.place[task], spans.open_s[task], spans.close_s[task] + EARLY_S,
+        eye.agile, end_s, looked, eye.path, eye.sites_m,
+        spans.site[task], spans.open_s[task], spans.close_s[task] + EARLY_S,
     )  # fmt: skip
     return exact_s - EARLY_S
 
@@ -175,8 +175,8 @@ def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: i
     """Return what a chain still remembers at the right edge of the cell it goes into."""
     if mask == _NONE:
         return mask
-    arrivals = cells.arrivals
-    to_s = cells.spans.open_s[other] + arrivals.width_s * (into - arrivals.first_cell[other] + 1)
+    earliest = cells.earliest
+    to_s = cells.spans.open_s[other] + earliest.width_s * (into - earliest.first_cell[other] + 1)
     first = int(from_s)
     last = min(int(to_s), len(cells.alive) - 1)
     mask &= cells.alive[last]
@@ -194,8 +194,8 @@ def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: i
 
 
 @borrowing_inner
-def _place_of(bit: np.uint64) -> int:
-    return int(_PLACE_OF_BIT[(bit * _DE_BRUIJN) >> _SHIFT])
+def _number_of(bit: np.uint64) -> int:
+    return int(_NUMBER_OF_BIT[(bit * _DE_BRUIJN) >> _SHIFT])
 
 
 @borrowing_inner
@@ -220,7 +220,7 @@ def _is_as_good(
         slack -= heaviest_task * math.ceil(late_s / cells.spare_s)
     while slack >= 0.0 and extra != _NONE:
         low = extra & (~extra + _ONE)
-        slack -= labels.bit_weight[_place_of(low)]
+        slack -= labels.bit_weight[_number_of(low)]
         extra ^= low
     return slack >= 0.0
 
@@ -294,7 +294,7 @@ def _insert(
         forgotten = (labels.mask[i] ^ mask) & (mask if value > labels.value[i] else labels.mask[i])
         while forgotten != _NONE:
             low = forgotten & (~forgotten + _ONE)
-            loss += 0.5 * labels.bit_weight[_place_of(low)]
+            loss += 0.5 * labels.bit_weight[_number_of(low)]
             forgotten ^= low
         if loss < least:
             least, into = loss, i

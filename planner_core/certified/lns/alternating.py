@@ -18,7 +18,7 @@ from planner_core.problem import COLLECT, Problem
 from planner_core.problem.plan import Plan
 
 
-class TurnSearch:
+class AlternatingSearch:
     """Plans by windows and by choices of tasks, in turn, from one start after another.
 
     The same for the same seed, whatever other searches go on beside it.
@@ -65,7 +65,7 @@ class TurnSearch:
         self.ended: list[Plan] = []
         self.usage = np.zeros(len(problem.opportunities))
 
-    def turn(self, num_steps: int) -> None:
+    def step(self, num_steps: int) -> None:
         """Let each search go on from where the other got to, or begin afresh where both stall."""
         for _ in range(num_steps):
             if self._idle_steps == TUNING.patience:

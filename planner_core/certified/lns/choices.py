@@ -69,7 +69,7 @@ class SatelliteChoices:
         """
         satellite = problem.satellites[index]
         network = strict_network_of(problem, satellite)
-        target = np.where(satellite.kind == COLLECT, satellite.place, -1).astype(np.int32)
+        target = np.where(satellite.kind == COLLECT, satellite.site, -1).astype(np.int32)
         levels = data_levels(network, 2, is_optimistic=False)
         in_units = np.round(worth[satellite.rows] / unit)
         cost = np.round(network.left_cost * np.maximum(levels.least, 0.0) / unit)
@@ -305,10 +305,10 @@ class ChoiceSearch:
 
     def _taken_targets(self, taken: Bools) -> Bools:
         table = self._problem.opportunities
-        return self._mask(table.place[taken & (table.kind == COLLECT)])
+        return self._mask(table.site[taken & (table.kind == COLLECT)])
 
     def _worth(self, taken: Bools) -> float:
         table = self._problem.opportunities
         images = np.flatnonzero(taken & (table.kind == COLLECT))
         left = [cost_on_board(one.network, taken[one.rows]) for _, one in self._satellites]
-        return worth_of(table.place[images], self._worths[images]) - sum(left)
+        return worth_of(table.site[images], self._worths[images]) - sum(left)

@@ -22,13 +22,13 @@ from planner_core.certified.lns.route import (
     update_early,
     update_late,
 )
-from planner_core.certified.signs import FIXED, FREE, NOWHERE
+from planner_core.certified.signs import FIXED, NOWHERE, UNASSIGNED
 from planner_core.certified.sizes import ROUTE_BUCKETS, ROUTE_LABELS, ROUTE_TASKS
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import Uint64s, next_draw
 from planner_core.jit import borrowing, borrowing_inner
-from planner_core.precedence.earliest_starts import Arrivals, cell_of, edge_s
-from planner_core.precedence.time_windows import Spans, View
+from planner_core.precedence.earliest_starts import EarliestStarts, cell_of, edge_s
+from planner_core.precedence.time_windows import TimeWindows, View
 from planner_core.problem import Bytes, Floats, Ints
 from planner_core.problem.pointing import needed_s, sight
 
@@ -74,16 +74,16 @@ class RouteSearch(NamedTuple):
     ----------
     worth
         Of each task; what must be kept is worth more than all else. Shape ``(n,)``.
-    holder
-        For each target the task that images it, or ``FREE``, ``ELSEWHERE`` or ``FIXED``. Shape
-        ``(num_targets,)``.
+    imaged_by
+        For each target the task that images it, or ``UNASSIGNED``, ``ELSEWHERE`` or ``FIXED``.
+        Shape ``(num_targets,)``.
     """
 
-    spans: Spans
+    spans: TimeWindows
     looks: View  # Numba has a meaning of its own for an attribute ``view``
-    arrivals: Arrivals
+    earliest: EarliestStarts
     worth: Floats
-    holder: Ints
+    imaged_by: Ints
     route: Route
     scratch: Scratch
     draws: Uint64s
@@ -125,7 +125,7 @@ def make_moves(
 ) -> None:
     """Make moves, in place, of windows that take up ``longest`` tasks at the most."""
     spans, route, draws = search.spans, search.route, search.draws
-    worth, holder = search.worth, search.holder
+    worth, imaged_by = search.worth, search.imaged_by
     n = len(spans.open_s)
     for _ in range(num_moves):
         if stop[0] or n == 0:
@@ -133,7 +133,7 @@ def make_moves(
         task = int(next_draw(draws) * n)
         if next_draw(draws) < _AIMED:
             for _ in range(_ATTEMPTS):
-                if holder[spans.place[task]] == FREE and worth[task] > 0.0:
+                if imaged_by[spans.site[task]] == UNASSIGNED and worth[task] > 0.0:
                     break
                 task = int(next_draw(draws) * n)
         at_s = spans.open_s[task] + next_draw(draws) * (spans.close_s[task] - spans.open_s[task])
@@ -157,13 +157,13 @@ def _replan(
 ) -> bool:
     """Plan the tasks ``first`` up to ``end`` anew; return whether the route has changed."""
     spans, view, route, scratch = search.spans, search.looks, search.route, search.scratch
-    worth, holder = search.worth, search.holder
+    worth, imaged_by = search.worth, search.imaged_by
     scratch.mark[0] += 1
     mark = scratch.mark[0]
     old_gain = 0.0
     for p in range(first, end):
         old_gain += worth[route.task[p]]
-        scratch.inside_mark[spans.place[route.task[p]]] = mark
+        scratch.inside_mark[spans.site[route.task[p]]] = mark
     last = _best_chain(search, first, end, old_gain)
     if last == NOWHERE:
         return False
@@ -177,12 +177,12 @@ def _replan(
     if not _time_chain(spans, view, route, scratch, first, end, size):
         return False
     for p in range(first, end):
-        holder[spans.place[route.task[p]]] = FREE
+        imaged_by[spans.site[route.task[p]]] = UNASSIGNED
     _put_in(spans, view, route, scratch, first, end, size)
     for i in range(size - 1, -1, -1):
         task = scratch.chosen[i]
-        held = holder[spans.place[task]]
-        holder[spans.place[task]] = task
+        held = imaged_by[spans.site[task]]
+        imaged_by[spans.site[task]] = task
         if held >= 0:
             # It is imaged twice now: the other image goes, perhaps of the same access.
             p = position_of(route, held, first, first + size)
@@ -195,7 +195,7 @@ def _replan(
 
 @borrowing_inner
 def _time_chain(
-    spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
+    spans: TimeWindows, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> bool:
     """Work out the chain's earliest starts; return whether it fits before what comes after."""
     before, start_s = -1, 0.0
@@ -215,7 +215,7 @@ def _time_chain(
 
 @borrowing_inner
 def _put_in(
-    spans: Spans, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
+    spans: TimeWindows, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> None:
     """Put the chain in place of the tasks ``first`` up to ``end``."""
     n, shift = route.size[0], size - (end - first)
@@ -250,7 +250,7 @@ def _best_chain(
     looks = (1.0, 0.0, 0.0)
     if end < route.size[0]:
         after, late_s = route.task[end], route.late_s[end]
-        looks = sight(view.path, view.places_m, spans.place[after], late_s)
+        looks = sight(view.path, view.sites_m, spans.site[after], late_s)
     count = 0
     from_s = 0.0
     if first > 0:
@@ -272,13 +272,13 @@ def _best_chain(
         while at >= 0:
             scratch.bucket[b] = scratch.following[at]
             task, start_s = scratch.task[at], scratch.start_s[at]
-            cell = cell_of(search.arrivals, spans, task, start_s)
+            cell = cell_of(search.earliest, spans, task, start_s)
             if scratch.label[cell] == at:
                 if scratch.value[at] > best_value and scratch.gain[at] >= old_gain - 1e-9:
                     done_s = start_s + spans.length_s[task]
                     fits = after < 0
                     if not fits and done_s <= late_s:
-                        looked = sight(view.path, view.places_m, spans.place[task], done_s)
+                        looked = sight(view.path, view.sites_m, spans.site[task], done_s)
                         fits = done_s + needed_s(view.agile, looked, looks) <= late_s + 0.02
                     if fits:
                         best, best_value = at, scratch.value[at]
@@ -292,12 +292,12 @@ def _extend(
     search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
     """Offer all that may follow a task at a start; return the number of labels then."""
-    spans, arrivals = search.spans, search.arrivals
-    cell = cell_of(arrivals, spans, task, start_s)
-    edge = edge_s(arrivals, spans, task, cell)
-    for arc in range(arrivals.first_arc[cell], arrivals.first_arc[cell + 1]):
-        other = arrivals.to[arc]
-        then_s = edge + arrivals.after_s[arc] + arrivals.slope[arc] * (start_s - edge)
+    spans, earliest = search.spans, search.earliest
+    cell = cell_of(earliest, spans, task, start_s)
+    edge = edge_s(earliest, spans, task, cell)
+    for arc in range(earliest.first_arc[cell], earliest.first_arc[cell + 1]):
+        other = earliest.to[arc]
+        then_s = edge + earliest.after_s[arc] + earliest.slope[arc] * (start_s - edge)
         then_s = max(then_s, spans.open_s[other])
         if then_s > spans.close_s[other]:
             continue
@@ -310,17 +310,17 @@ def _offer(
     search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
     """Keep a chain that goes on to a task, where it is the best in its cell."""
-    spans, arrivals, scratch = search.spans, search.arrivals, search.scratch
-    worth, holder = search.worth, search.holder
+    spans, earliest, scratch = search.spans, search.earliest, search.scratch
+    worth, imaged_by = search.worth, search.imaged_by
     from_s, late_s = within_s
     if start_s + spans.length_s[task] > late_s or count == ROUTE_LABELS:
         return count
-    mark, place = scratch.mark[0], spans.place[task]
-    is_inside = scratch.inside_mark[place] == mark
-    held = holder[place]
+    mark, site = scratch.mark[0], spans.site[task]
+    is_inside = scratch.inside_mark[site] == mark
+    held = imaged_by[site]
     if held == FIXED:
         return count
-    is_new = is_inside or held == FREE
+    is_new = is_inside or held == UNASSIGNED
     if not is_new and held >= 0 and spans.is_kept[held]:
         return count
     if scratch.worth_mark[task] != mark:
@@ -333,13 +333,13 @@ def _offer(
     value = scratch.worth[task]
     if parent >= 0:
         value += scratch.value[parent]
-    cell = cell_of(arrivals, spans, task, start_s)
-    for other in range(arrivals.first_cell[task], cell + 1):
+    cell = cell_of(earliest, spans, task, start_s)
+    for other in range(earliest.first_cell[task], cell + 1):
         if scratch.label_mark[other] == mark and scratch.value[scratch.label[other]] >= value:
             return count
     at = parent
     while at >= 0:
-        if spans.place[scratch.task[at]] == place:
+        if spans.site[scratch.task[at]] == site:
             return count
         at = scratch.parent[at]
     bucket = int((start_s - from_s) * 0.25)

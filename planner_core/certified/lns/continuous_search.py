@@ -11,13 +11,13 @@ from planner_core.certified.lns.continuous_moves import RouteSearch, make_moves,
 from planner_core.certified.lns.insertion import insert_each
 from planner_core.certified.lns.route import Route, empty_route, remove, update_early, update_late
 from planner_core.certified.proofs.continuous import rough_cell_s, width_for
-from planner_core.certified.signs import ELSEWHERE, FIXED, FREE
+from planner_core.certified.signs import ELSEWHERE, FIXED, UNASSIGNED
 from planner_core.certified.sizes import MAX_FOLLOWERS
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
-from planner_core.precedence.earliest_starts import Arrivals, arrivals_of
+from planner_core.precedence.earliest_starts import EarliestStarts, earliest_starts_of
 from planner_core.precedence.time_windows import (
-    Spans,
+    TimeWindows,
     View,
     action_of,
     spans_of,
@@ -37,7 +37,7 @@ from planner_core.referee.replay import replay
 class Satellite:
     """What the search knows of one satellite, and its part of the plan."""
 
-    spans: Spans
+    spans: TimeWindows
     view: View
     worth: Floats
     route: Route
@@ -57,7 +57,7 @@ class Satellite:
                 is_its = (table.access[spans.row] == table.access[i]) & (
                     spans.close_s > action.start_s - 1e-3
                 )
-                tasks.setdefault(int(table.place[i]), int(np.flatnonzero(is_its)[0]))
+                tasks.setdefault(int(table.site[i]), int(np.flatnonzero(is_its)[0]))
         route = empty_route(len(spans.row) + 128)
         route.size[0] = len(tasks)
         route.task[: len(tasks)] = list(tasks.values())
@@ -88,16 +88,18 @@ class ContinuousSearch:
         self.satellites = [
             Satellite.of(problem, index, plan) for index in range(len(problem.satellites))
         ]
-        self._tables: dict[int, Arrivals] = {}
+        self._tables: dict[int, EarliestStarts] = {}
         self._num_kept = self._num_calls = 0
         self._width_s = max(rough_cell_s(), width_for(problem))
 
-    def arrivals(self, index: int) -> Arrivals:
+    def earliest(self, index: int) -> EarliestStarts:
         """Return a satellite's table; kept from turn to turn where all of them are small."""
         table = self._tables.get(index)
         if table is None:
             satellite = self.satellites[index]
-            table = arrivals_of(satellite.spans, satellite.view, self._width_s, self.budget.stop)
+            table = earliest_starts_of(
+                satellite.spans, satellite.view, self._width_s, self.budget.stop
+            )
             if self._num_kept + len(table.to) <= MAX_FOLLOWERS:
                 self._tables[index] = table
                 self._num_kept += len(table.to)
@@ -108,7 +110,7 @@ class ContinuousSearch:
         for index, satellite in enumerate(self.satellites):
             order = np.lexsort((satellite.spans.open_s, -satellite.worth)).astype(np.int32)
             insert_each(
-                satellite.spans, satellite.view, order, self._holder(index), satellite.route,
+                satellite.spans, satellite.view, order, self._imaged_by(index), satellite.route,
                 self.budget.stop,
             )  # fmt: skip
         self._note()
@@ -128,44 +130,44 @@ class ContinuousSearch:
                 left = num_moves * TUNING.rounds
             if self.budget.is_spent() or len(self.satellites[index].spans.row) == 0:
                 continue
-            arrivals = self.arrivals(index)
+            earliest = self.earliest(index)
             while left > 0 and not self.budget.is_spent():
-                self._turn(index, arrivals, min(left, TUNING.moves_at_a_time))
+                self._turn(index, earliest, min(left, TUNING.moves_at_a_time))
                 left -= TUNING.moves_at_a_time
         self._note()
         return self.reward > before
 
-    def _turn(self, index: int, arrivals: Arrivals, num_moves: int) -> None:
+    def _turn(self, index: int, earliest: EarliestStarts, num_moves: int) -> None:
         """Make moves on one satellite."""
         satellite = self.satellites[index]
         spans, view = satellite.spans, satellite.view
-        num_cells = int(arrivals.first_cell[-1])
+        num_cells = int(earliest.first_cell[-1])
         scratch = scratch_of(len(spans.row), num_cells, len(self.problem.target_ids))
-        holder = self._holder(index)
-        before = holder.copy()
+        imaged_by = self._imaged_by(index)
+        before = imaged_by.copy()
         search = RouteSearch(
-            spans, view, arrivals, satellite.worth, holder, satellite.route, scratch, self._draws
+            spans, view, earliest, satellite.worth, imaged_by, satellite.route, scratch, self._draws
         )
         make_moves(search, num_moves, TUNING.window_tasks[1], self.budget.stop)
-        for place in np.flatnonzero((before == ELSEWHERE) & (holder >= 0)).tolist():
-            self._give_up(index, place)
+        for site in np.flatnonzero((before == ELSEWHERE) & (imaged_by >= 0)).tolist():
+            self._give_up(index, site)
 
-    def _holder(self, index: int) -> Ints:
+    def _imaged_by(self, index: int) -> Ints:
         """Return who has each target, as one satellite sees it."""
-        holder = np.full(len(self.problem.target_ids), FREE, dtype=np.int32)
+        imaged_by = np.full(len(self.problem.target_ids), UNASSIGNED, dtype=np.int32)
         for other in self.satellites:
             is_kept = other.spans.is_kept[other.tasks]
-            holder[other.spans.place[other.tasks]] = np.where(is_kept, FIXED, ELSEWHERE)
+            imaged_by[other.spans.site[other.tasks]] = np.where(is_kept, FIXED, ELSEWHERE)
         satellite = self.satellites[index]
-        holder[satellite.spans.place[satellite.tasks]] = satellite.tasks
-        return holder
+        imaged_by[satellite.spans.site[satellite.tasks]] = satellite.tasks
+        return imaged_by
 
-    def _give_up(self, index: int, place: int) -> None:
+    def _give_up(self, index: int, site: int) -> None:
         """Take a target from whoever else holds it."""
         for other, satellite in enumerate(self.satellites):
             if other == index:
                 continue
-            for p in np.flatnonzero(satellite.spans.place[satellite.tasks] == place).tolist():
+            for p in np.flatnonzero(satellite.spans.site[satellite.tasks] == site).tolist():
                 remove(satellite.spans, satellite.view, satellite.route, p)
 
     def _note(self) -> None:

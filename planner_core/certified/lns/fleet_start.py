@@ -1,8 +1,8 @@
 """A first plan of a fleet: one stretch of one satellite after another, over what is left.
 
-Taken alone the first ones would snatch targets that only the last ones can reach. At the prices
-of the bound a target that several can have is worth little to each of them, and all end up with
-about what the best plans give them.
+Taken alone the first ones would snatch targets that only the last ones can reach. At the
+multipliers of the bound a target that several can have is worth little to each of them, and all end
+up with about what the best plans give them.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from planner_core.precedence.network import Network, heaviest_path
 from planner_core.problem import Bools, Floats, Ints
 
 
-def priced_start(
-    network: Network, worth: Floats, prices: Floats, taken: Bools, seed: int
+def start_at_multipliers(
+    network: Network, worth: Floats, multipliers: Floats, taken: Bools, seed: int
 ) -> list[int]:
-    """Return the rows of the best of a few plans; what they earn counts without the prices.
+    """Return the rows of the best of a few plans; what they earn counts without the multipliers.
 
     Parameters
     ----------
     worth
         Of each node. Shape ``(n,)``.
-    prices
-        Of each place, with a last entry of zero that stands for contacts.
+    multipliers
+        Of each site, with a last entry of zero that stands for contacts.
     taken
-        Places that are taken already. Shape of ``prices``.
+        Places that are taken already. Shape of ``multipliers``.
     """
     rng = np.random.default_rng(seed)
-    priced = np.maximum(worth - prices[network.place], TUNING.trifle * worth)
+    priced = np.maximum(worth - multipliers[network.site], TUNING.trifle * worth)
     weight, value = np.empty(len(network.row)), np.empty(len(network.row))
     previous = np.empty(len(network.row), dtype=np.int32)
     best, best_reward = [], -1.0
@@ -55,19 +55,19 @@ def _take(
 ) -> Ints:  # fmt: skip
     """Return the best node of each target that is left on the heaviest path, and take those."""
     for a in range(network.first[part], network.first[part + 1]):
-        weight[a] = priced[a] if is_left[network.place[a]] else 0.0
+        weight[a] = priced[a] if is_left[network.site[a]] else 0.0
     _, at = heaviest_path(network, part, weight, value, previous)
     nodes = np.empty(network.first[part + 1] - network.first[part], dtype=np.int32)
     count = 0
     while at >= 0:
-        place = network.place[at]
-        if weight[at] > 0.0 and is_left[place]:
-            is_left[place] = False
+        site = network.site[at]
+        if weight[at] > 0.0 and is_left[site]:
+            is_left[site] = False
             nodes[count] = at
             count += 1
         elif weight[at] > 0.0:
             for i in range(count):
-                if network.place[nodes[i]] == place and worth[nodes[i]] < worth[at]:
+                if network.site[nodes[i]] == site and worth[nodes[i]] < worth[at]:
                     nodes[i] = at
         at = previous[at]
     return nodes[:count].copy()

@@ -11,9 +11,9 @@ from planner_core.certified.lns.route import (
     update_early,
     update_late,
 )
-from planner_core.certified.signs import FREE
+from planner_core.certified.signs import UNASSIGNED
 from planner_core.jit import borrowing, borrowing_inner, kernel
-from planner_core.precedence.time_windows import Spans, View
+from planner_core.precedence.time_windows import TimeWindows, View
 from planner_core.problem import Bools, Bytes, Ints
 
 
@@ -31,7 +31,7 @@ def first_near(route: Route, instant_s: float) -> int:
 
 
 @borrowing_inner
-def fits_at(spans: Spans, view: View, route: Route, task: int, p: int) -> float:
+def fits_at(spans: TimeWindows, view: View, route: Route, task: int, p: int) -> float:
     """Return the earliest start of a task before position ``p``; infinite where it cannot be.
 
     Minus infinity where it comes too late after the task ahead of it, and so would further on.
@@ -52,13 +52,13 @@ def fits_at(spans: Spans, view: View, route: Route, task: int, p: int) -> float:
 
 @borrowing
 def insert_each(
-    spans: Spans, view: View, order: Ints, holder: Ints, route: Route, stop: Bytes
+    spans: TimeWindows, view: View, order: Ints, imaged_by: Ints, route: Route, stop: Bytes
 ) -> None:
     """Put in each task of ``order`` whose target nobody has, where it fits first."""
     for task in order:
         if stop[0]:
             return
-        if holder[spans.place[task]] != FREE:
+        if imaged_by[spans.site[task]] != UNASSIGNED:
             continue
         for p in range(first_near(route, spans.open_s[task]), route.size[0] + 1):
             then_s = fits_at(spans, view, route, task, p)
@@ -66,12 +66,14 @@ def insert_each(
                 break
             if then_s < np.inf:
                 _put_in(spans, view, route, task, p, then_s)
-                holder[spans.place[task]] = task
+                imaged_by[spans.site[task]] = task
                 break
 
 
 @borrowing_inner
-def _put_in(spans: Spans, view: View, route: Route, task: int, p: int, start_s: float) -> None:
+def _put_in(
+    spans: TimeWindows, view: View, route: Route, task: int, p: int, start_s: float
+) -> None:
     for q in range(route.size[0], p, -1):
         route.task[q] = route.task[q - 1]
         route.early_s[q] = route.early_s[q - 1]
@@ -83,11 +85,11 @@ def _put_in(spans: Spans, view: View, route: Route, task: int, p: int, start_s: 
 
 
 @kernel
-def fitting(spans: Spans, view: View, route: Route, is_free: Bools) -> tuple[Ints, Ints]:
+def fitting(spans: TimeWindows, view: View, route: Route, is_free: Bools) -> tuple[Ints, Ints]:
     """Return the tasks on free places that fit by agility, and the position of each."""
-    tasks, places = [np.int32(0) for _ in range(0)], [np.int32(0) for _ in range(0)]
+    tasks, positions = [np.int32(0) for _ in range(0)], [np.int32(0) for _ in range(0)]
     for task in range(len(spans.row)):
-        if not is_free[spans.place[task]]:
+        if not is_free[spans.site[task]]:
             continue
         for p in range(first_near(route, spans.open_s[task]), route.size[0] + 1):
             then_s = fits_at(spans, view, route, task, p)
@@ -95,5 +97,5 @@ def fitting(spans: Spans, view: View, route: Route, is_free: Bools) -> tuple[Int
                 break
             if then_s < np.inf:
                 tasks.append(np.int32(task))
-                places.append(np.int32(p))
-    return np.array(tasks, dtype=np.int32), np.array(places, dtype=np.int32)
+                positions.append(np.int32(p))
+    return np.array(tasks, dtype=np.int32), np.array(positions, dtype=np.int32)

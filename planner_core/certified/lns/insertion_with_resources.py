@@ -19,7 +19,7 @@ from planner_core.certified.lns.route import (
 )
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.time_windows import (
-    Spans,
+    TimeWindows,
     View,
     action_of,
     spans_of,
@@ -99,7 +99,7 @@ def _filled(
         is_free = np.ones(len(problem.target_ids) + len(problem.station_ids), dtype=np.bool_)
         for action in (*own, *others):
             if table.kind[action.opportunity] == COLLECT:
-                is_free[table.place[action.opportunity]] = False
+                is_free[table.site[action.opportunity]] = False
         is_free[len(problem.target_ids) :] = False
         task, at = fitting(spans, view, route, is_free)
         drawn = np.arange(len(task)) if rng is None else rng.permutation(len(task))
@@ -124,7 +124,7 @@ def _filled(
     return plan
 
 
-def _task_of(problem: Problem, spans: Spans, action: Action) -> int:
+def _task_of(problem: Problem, spans: TimeWindows, action: Action) -> int:
     table = problem.opportunities
     is_its = (table.access[spans.row] == table.access[action.opportunity]) & (
         spans.close_s > action.start_s - 1e-3
@@ -132,7 +132,7 @@ def _task_of(problem: Problem, spans: Spans, action: Action) -> int:
     return int(np.flatnonzero(is_its)[0])
 
 
-def _route_of(spans: Spans, view: View, tasks: list[int]) -> Route | None:
+def _route_of(spans: TimeWindows, view: View, tasks: list[int]) -> Route | None:
     route = empty_route(len(tasks))
     route.size[0] = len(tasks)
     route.task[:] = tasks
@@ -142,7 +142,9 @@ def _route_of(spans: Spans, view: View, tasks: list[int]) -> Route | None:
     return route if is_timed else None
 
 
-def _actions(problem: Problem, spans: Spans, view: View, tasks: list[int]) -> list[Action] | None:
+def _actions(
+    problem: Problem, spans: TimeWindows, view: View, tasks: list[int]
+) -> list[Action] | None:
     route = _route_of(spans, view, tasks)
     if route is None:
         return None

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from planner_core.bundles import bundle
-from planner_core.certified.lns.window_chains import Room, follows, heaviest_chain
-from planner_core.certified.signs import FREE, NO_TASK, NOWHERE
+from planner_core.certified.lns.window_chains import Workspace, follows, heaviest_chain
+from planner_core.certified.signs import NO_TASK, NOWHERE, UNASSIGNED
 from planner_core.certified.sizes import WINDOW_NODES, WINDOW_WORDS
 from planner_core.certified.tolerances import SLIGHT
 from planner_core.certified.tuning import TUNING
@@ -22,13 +22,13 @@ from planner_core.problem import Bools, Bytes, Floats, Ints
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
 _FEWEST_TASKS, _MOST_TASKS = TUNING.window_tasks
-_FOR_FREE_TARGET: Final = TUNING.aimed
+_FOR_UNASSIGNED: Final = TUNING.aimed
 _TRIALS: Final = TUNING.patience
 _TIE: Final = TUNING.tie
 
 
 @bundle
-class Ground(NamedTuple):
+class SearchData(NamedTuple):
     """What moves do not change. Shape ``(n,)``, for the nodes of the network, unless said.
 
     Attributes
@@ -59,17 +59,17 @@ class Ground(NamedTuple):
 
 
 @bundle
-class Taken(NamedTuple):
-    """The plan: which nodes it takes, and for each target the node that images it, or ``FREE``."""
+class Assignment(NamedTuple):
+    """The plan: the nodes it takes, and the node that images each target (or ``UNASSIGNED``)."""
 
     is_taken: Bools
-    holder: Ints
+    imaged_by: Ints
 
 
 @borrowing
 def make_moves(
-    ground: Ground, taken: Taken, offered: Bools, room: Room, draws: Uint64s, num_moves: int,
-    stop: Bytes,
+    search: SearchData, plan: Assignment, offered: Bools, work: Workspace, draws: Uint64s,
+    num_moves: int, stop: Bytes,
 ) -> None:  # fmt: skip
     """Make moves on a plan, in place.
 
@@ -78,56 +78,56 @@ def make_moves(
     offered
         Nodes that moves may take beside those that are taken. Shape ``(n,)``.
     """
-    if len(ground.network.place) == 0:
+    if len(search.network.site) == 0:
         return
     for _ in range(num_moves):
         if stop[0]:
             return
-        pivot = _pivot(ground, taken, offered, draws)
-        part = _part_of(ground, pivot)
-        begin, end = ground.network.first[part], ground.network.first[part + 1]
-        low, high = _window(taken, pivot, begin, end, draws)
+        pivot = _pivot(search, plan, offered, draws)
+        part = _part_of(search, pivot)
+        begin, end = search.network.first[part], search.network.first[part + 1]
+        low, high = _window(plan, pivot, begin, end, draws)
         left, right = low - 1, high
-        while left >= begin and not taken.is_taken[left]:
+        while left >= begin and not plan.is_taken[left]:
             left -= 1
-        while right < end and not taken.is_taken[right]:
+        while right < end and not plan.is_taken[right]:
             right += 1
         # What begins before the task on the left ends is in no chain after it.
         if left >= begin:
-            after_s = ground.network.end_s[left] - TIME_TOLERANCE_S
-            while low < high and ground.network.start_s[low] < after_s:
+            after_s = search.network.end_s[left] - TIME_TOLERANCE_S
+            while low < high and search.network.start_s[low] < after_s:
                 low += 1
         if low >= high:
             continue
-        num_words = _weigh(ground, taken, offered, room, low, high, draws)
+        num_words = _weigh(search, plan, offered, work, low, high, draws)
         if num_words > WINDOW_WORDS:
             continue
         ends = (left if left >= begin else NO_TASK, right if right < end else NO_TASK)
-        last = heaviest_chain(ground.network, room, num_words, part, ends, low, high)
+        last = heaviest_chain(search.network, work, num_words, part, ends, low, high)
         if last != NOWHERE:
-            _replace(ground, taken, room, low, high, last)
+            _replace(search, plan, work, low, high, last)
 
 
 @borrowing_inner
-def _pivot(ground: Ground, taken: Taken, offered: Bools, draws: Uint64s) -> int:
+def _pivot(search: SearchData, plan: Assignment, offered: Bools, draws: Uint64s) -> int:
     """Return a node at random, mostly one of a target that is not imaged."""
-    n = len(ground.network.place)
-    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET else 1
+    n = len(search.network.site)
+    num_trials = _TRIALS if next_draw(draws) < _FOR_UNASSIGNED else 1
     pivot = 0
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * n)
-        target = ground.network.place[pivot]
-        if offered[pivot] and taken.holder[target] == FREE and ground.worth[pivot] > 0.0:
+        target = search.network.site[pivot]
+        if offered[pivot] and plan.imaged_by[target] == UNASSIGNED and search.worth[pivot] > 0.0:
             break
     return pivot
 
 
 @borrowing_inner
-def _part_of(ground: Ground, node: int) -> int:
-    low, high = 0, len(ground.network.first) - 1
+def _part_of(search: SearchData, node: int) -> int:
+    low, high = 0, len(search.network.first) - 1
     while high - low > 1:
         middle = (low + high) >> 1
-        if ground.network.first[middle] <= node:
+        if search.network.first[middle] <= node:
             low = middle
         else:
             high = middle
@@ -135,7 +135,7 @@ def _part_of(ground: Ground, node: int) -> int:
 
 
 @borrowing_inner
-def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> tuple[int, int]:
+def _window(plan: Assignment, pivot: int, begin: int, end: int, draws: Uint64s) -> tuple[int, int]:
     """Return the nodes between two tasks of the plan, a few tasks apart, around the pivot."""
     num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
     num_before = int(next_draw(draws) * (num_tasks + 1))
@@ -143,14 +143,14 @@ def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> t
     low, high = pivot, pivot
     count = 0
     while low > lowest:
-        if taken.is_taken[low - 1]:
+        if plan.is_taken[low - 1]:
             if count == num_before:
                 break
             count += 1
         low -= 1
     count = 0
     while high < highest:
-        if taken.is_taken[high]:
+        if plan.is_taken[high]:
             if count == num_tasks - num_before:
                 break
             count += 1
@@ -160,7 +160,13 @@ def _window(taken: Taken, pivot: int, begin: int, end: int, draws: Uint64s) -> t
 
 @borrowing_inner
 def _weigh(
-    ground: Ground, taken: Taken, offered: Bools, room: Room, low: int, high: int, draws: Uint64s
+    search: SearchData,
+    plan: Assignment,
+    offered: Bools,
+    work: Workspace,
+    low: int,
+    high: int,
+    draws: Uint64s,
 ) -> int:
     """Give a window's nodes weights; return how many words a set of its targets takes.
 
@@ -168,114 +174,116 @@ def _weigh(
 
     Ties are broken at random, so that the search wanders over plans of equal worth.
     """
-    move = room.move[0] + 1
-    room.move[0] = move
-    tie = _TIE if ground.is_alike or move & 1 else SLIGHT
+    move = work.move[0] + 1
+    work.move[0] = move
+    tie = _TIE if search.is_alike or move & 1 else SLIGHT
     count = 0
     for node in range(low, high):
-        room.weight[node - low] = 0.0
-        target, worth = ground.network.place[node], ground.worth[node]
-        if worth <= 0.0 or not (offered[node] or taken.is_taken[node]):
+        work.weight[node - low] = 0.0
+        target, worth = search.network.site[node], search.worth[node]
+        if worth <= 0.0 or not (offered[node] or plan.is_taken[node]):
             continue
-        held = taken.holder[target]
-        is_held_elsewhere = held != FREE and not low <= held < high
-        if room.marked_at[target] != move:
-            room.marked_at[target] = move
-            room.number[target] = -1
+        held = plan.imaged_by[target]
+        is_held_elsewhere = held != UNASSIGNED and not low <= held < high
+        if work.marked_at[target] != move:
+            work.marked_at[target] = move
+            work.number[target] = -1
             if not is_held_elsewhere:
-                room.tie[target] = 1.0 + tie * next_draw(draws)
-            elif not ground.is_locked[target]:
-                room.tie[target] = 2.0 * next_draw(draws) - 1.0
-        elif room.number[target] < 0:
-            room.number[target] = count
+                work.tie[target] = 1.0 + tie * next_draw(draws)
+            elif not search.is_locked[target]:
+                work.tie[target] = 2.0 * next_draw(draws) - 1.0
+        elif work.number[target] < 0:
+            work.number[target] = count
             count += 1
-        weight = worth * ground.preference[target]
-        if ground.is_locked[target] and not ground.is_kept[node]:
+        weight = worth * search.preference[target]
+        if search.is_locked[target] and not search.is_kept[node]:
             continue
         if not is_held_elsewhere:
-            room.weight[node - low] = weight * room.tie[target]
-        elif not ground.is_locked[target]:
-            better = (worth - ground.worth[held]) * ground.preference[target]
-            room.weight[node - low] = better + weight * tie * room.tie[target]
-        if ground.is_kept[node]:
-            room.weight[node - low] += ground.kept_worth
+            work.weight[node - low] = weight * work.tie[target]
+        elif not search.is_locked[target]:
+            better = (worth - search.worth[held]) * search.preference[target]
+            work.weight[node - low] = better + weight * tie * work.tie[target]
+        if search.is_kept[node]:
+            work.weight[node - low] += search.kept_worth
     return (count + 63) >> 6
 
 
 @borrowing_inner
-def _replace(ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int) -> None:
+def _replace(
+    search: SearchData, plan: Assignment, work: Workspace, low: int, high: int, last: int
+) -> None:
     """Let a chain take the place of what is in the window, unless the plan is worth less then."""
     num_new, worth = 0, 0.0
     at = last
     while at >= 0:
-        k = room.sky.node[at]
+        k = work.sky.node[at]
         node = low + k
-        room.path[num_new] = node
+        work.path[num_new] = node
         num_new += 1
-        held = taken.holder[ground.network.place[node]]
-        worth += ground.worth[node]
-        if held != FREE and not low <= held < high:
-            worth -= ground.worth[held]
-        if ground.is_kept[node]:
-            worth += ground.kept_worth
-        at = room.source[k]
+        held = plan.imaged_by[search.network.site[node]]
+        worth += search.worth[node]
+        if held != UNASSIGNED and not low <= held < high:
+            worth -= search.worth[held]
+        if search.is_kept[node]:
+            worth += search.kept_worth
+        at = work.source[k]
     num_old = 0
     for node in range(low, high):
-        if taken.is_taken[node]:
-            room.old[num_old] = node
+        if plan.is_taken[node]:
+            work.old[num_old] = node
             num_old += 1
-            if taken.holder[ground.network.place[node]] == node:
-                worth -= ground.worth[node]
-            if ground.is_kept[node]:
-                worth -= ground.kept_worth
+            if plan.imaged_by[search.network.site[node]] == node:
+                worth -= search.worth[node]
+            if search.is_kept[node]:
+                worth -= search.kept_worth
     if worth < -1e-9:
         return
     for i in range(num_old):
-        _let_go(ground, taken, room.old[i])
+        _let_go(search, plan, work.old[i])
     num_dropped = 0
     for i in range(num_new):
-        held = taken.holder[ground.network.place[room.path[i]]]
-        if held != FREE:
-            room.dropped[num_dropped] = held
+        held = plan.imaged_by[search.network.site[work.path[i]]]
+        if held != UNASSIGNED:
+            work.dropped[num_dropped] = held
             num_dropped += 1
-            _let_go(ground, taken, held)
-        _take(ground, taken, room.path[i])
+            _let_go(search, plan, held)
+        _take(search, plan, work.path[i])
     for i in range(num_dropped):
-        if not _is_sound_around(ground, taken, room.dropped[i]):
+        if not _is_sound_around(search, plan, work.dropped[i]):
             for j in range(num_new):
-                _let_go(ground, taken, room.path[j])
+                _let_go(search, plan, work.path[j])
             for j in range(num_dropped):
-                _take(ground, taken, room.dropped[j])
+                _take(search, plan, work.dropped[j])
             for j in range(num_old):
-                _take(ground, taken, room.old[j])
+                _take(search, plan, work.old[j])
             return
 
 
 @borrowing_inner
-def _take(ground: Ground, taken: Taken, node: int) -> None:
-    taken.is_taken[node] = True
-    if taken.holder[ground.network.place[node]] == FREE:
-        taken.holder[ground.network.place[node]] = node
+def _take(search: SearchData, plan: Assignment, node: int) -> None:
+    plan.is_taken[node] = True
+    if plan.imaged_by[search.network.site[node]] == UNASSIGNED:
+        plan.imaged_by[search.network.site[node]] = node
 
 
 @borrowing_inner
-def _let_go(ground: Ground, taken: Taken, node: int) -> None:
-    taken.is_taken[node] = False
-    if taken.holder[ground.network.place[node]] == node:
-        taken.holder[ground.network.place[node]] = FREE
+def _let_go(search: SearchData, plan: Assignment, node: int) -> None:
+    plan.is_taken[node] = False
+    if plan.imaged_by[search.network.site[node]] == node:
+        plan.imaged_by[search.network.site[node]] = UNASSIGNED
 
 
 @borrowing_inner
-def _is_sound_around(ground: Ground, taken: Taken, node: int) -> bool:
+def _is_sound_around(search: SearchData, plan: Assignment, node: int) -> bool:
     """Return whether the tasks around one that was let go can do without it."""
-    part = _part_of(ground, node)
-    if ground.is_transitive[part]:
+    part = _part_of(search, node)
+    if search.is_transitive[part]:
         return True
     before, after = node - 1, node + 1
-    while before >= ground.network.first[part] and not taken.is_taken[before]:
+    while before >= search.network.first[part] and not plan.is_taken[before]:
         before -= 1
-    while after < ground.network.first[part + 1] and not taken.is_taken[after]:
+    while after < search.network.first[part + 1] and not plan.is_taken[after]:
         after += 1
-    is_between = before >= ground.network.first[part] and after < ground.network.first[part + 1]
-    network = ground.network
+    is_between = before >= search.network.first[part] and after < search.network.first[part + 1]
+    network = search.network
     return not is_between or follows(network, slews_in(network, part), before, after)

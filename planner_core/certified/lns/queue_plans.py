@@ -32,7 +32,7 @@ from planner_core.solvers.sequential import blocked_rows
 
 
 def plan_with_queues(
-    problem: Problem, price: Floats, rng: np.random.Generator, stop: Bytes, per_collect: int
+    problem: Problem, multiplier: Floats, rng: np.random.Generator, stop: Bytes, per_collect: int
 ) -> Plan | None:
     """Return a good plan that takes no contacts but those that it must; None without programmes.
 
@@ -41,14 +41,14 @@ def plan_with_queues(
 
     Parameters
     ----------
-    price
+    multiplier
         Of each target, which keeps satellites from taking it twice. Shape ``(num_targets,)``.
     per_collect
         How many levels of energy the cheapest collect takes. Rounded against the plan, they cost it
         up to one in each orbit.
     """
     for keeps_recorder in (False, True):
-        plan = _plan(problem, price, rng, stop, per_collect, keeps_recorder=keeps_recorder)
+        plan = _plan(problem, multiplier, rng, stop, per_collect, keeps_recorder=keeps_recorder)
         if plan is None or stop[0] or replay(problem, plan, in_detail=False).is_valid:
             break
     return plan
@@ -75,17 +75,24 @@ def replanned_day(
     is_own = np.isin(rows, satellite.rows)
     own, others = rows[is_own], rows[~is_own]
     is_free = np.ones(len(problem.target_ids), dtype=np.bool_)
-    is_free[table.place[others[table.kind[others] == COLLECT]]] = False
+    is_free[table.site[others[table.kind[others] == COLLECT]]] = False
     is_tried = some_contacts(satellite, len(table), rng)
     is_tried[own] = True
     levels = per_collect // TUNING.several
     contacts = _named_contacts(problem, satellite, is_free, is_tried, others, levels, stop)
     if contacts is None:
         contacts = own[table.kind[own] == CONTACT].tolist()
-    part, price = taking(problem, contacts), np.zeros(len(is_free))
+    part, multiplier = taking(problem, contacts), np.zeros(len(is_free))
     for keeps_recorder in (False, True):
         path = _settled(
-            part, satellite, is_free, price, rng, stop, per_collect, keeps_recorder=keeps_recorder
+            part,
+            satellite,
+            is_free,
+            multiplier,
+            rng,
+            stop,
+            per_collect,
+            keeps_recorder=keeps_recorder,
         )
         if path is None:
             return None
@@ -130,7 +137,7 @@ def _named_contacts(
     is_shut = blocked_rows(problem, satellite, taken.tolist()) != 0
     is_image = satellite.kind == COLLECT
     is_contact_open = ~is_shut & is_tried[satellite.rows]
-    is_open = np.where(is_image, is_free[satellite.place * is_image], is_contact_open)
+    is_open = np.where(is_image, is_free[satellite.site * is_image], is_contact_open)
     network = network_of(problem, satellite)
     rows = np.flatnonzero(is_open | network.is_kept).astype(np.int32)
     queues = queues_of(
@@ -151,7 +158,7 @@ def _named_contacts(
 
 def _plan(
     problem: Problem,
-    price: Floats,
+    multiplier: Floats,
     rng: np.random.Generator,
     stop: Bytes,
     per_collect: int,
@@ -168,7 +175,7 @@ def _plan(
             problem,
             satellite,
             is_free,
-            price,
+            multiplier,
             rng,
             stop,
             per_collect,
@@ -177,7 +184,7 @@ def _plan(
         if path is None:
             return None
         images = path[satellite.kind[path] == COLLECT]
-        is_free[satellite.place[images]] = False
+        is_free[satellite.site[images]] = False
         rows += satellite.rows[path].tolist()
     return Plan.of(problem, rows)
 
@@ -186,7 +193,7 @@ def _settled(
     problem: Problem,
     satellite: SatelliteProblem,
     is_free: Bools,
-    price: Floats,
+    multiplier: Floats,
     rng: np.random.Generator,
     stop: Bytes,
     per_collect: int,
@@ -196,7 +203,7 @@ def _settled(
     """Return a path of a satellite that takes each target once, of those that are free."""
     network = strict_network_of(problem, satellite)
     is_image = satellite.kind == COLLECT
-    is_open = is_image & is_free[satellite.place * is_image]
+    is_open = is_image & is_free[satellite.site * is_image]
     is_open &= problem.worth[satellite.rows] > 0.0
     is_open |= network.is_kept
     while not stop[0]:
@@ -205,7 +212,7 @@ def _settled(
             problem,
             satellite,
             network,
-            price,
+            multiplier,
             per_collect=per_collect,
             num_classes=1,
             rows=rows,
@@ -217,11 +224,11 @@ def _settled(
         path = rows[most_by_queues(queues, stop)[1]]
         # What must be taken stays, even two images of a target.
         images = rng.permutation(path[is_image[path] & ~network.is_kept[path]])
-        _, first, counts = np.unique(satellite.place[images], return_index=True, return_counts=True)
+        _, first, counts = np.unique(satellite.site[images], return_index=True, return_counts=True)
         if counts.max(initial=1) == 1:
             return path
         # Which of the two matters little: hundreds of others can take its place.
         settled = images[first]
-        is_open &= ~(is_image & np.isin(satellite.place, satellite.place[settled]))
+        is_open &= ~(is_image & np.isin(satellite.site, satellite.site[settled]))
         is_open[settled] = True
     return None

@@ -25,7 +25,7 @@ from planner_core.problem import (
 
 
 @bundle
-class Ground(NamedTuple):
+class SearchData(NamedTuple):
     """What moves do not change; one satellite's tasks, shape ``(m,)``, unless said.
 
     Attributes
@@ -76,7 +76,7 @@ class Ground(NamedTuple):
 
 
 @bundle
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Working memory of a window: labels, those that idle, and the tasks that begin to.
 
     Attributes
@@ -140,7 +140,7 @@ class After(NamedTuple):
     left_cost: float
 
 
-def room_for(num_targets: int) -> Room:
+def workspace_for(num_targets: int) -> Workspace:
     """Return working memory for a problem of so many targets."""
 
     def floats(length: int) -> Floats:
@@ -149,7 +149,7 @@ def room_for(num_targets: int) -> Room:
     def ints(length: int) -> Ints:
         return np.zeros(length, dtype=np.int32)
 
-    return Room(
+    return Workspace(
         value=floats(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
         energy=floats(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
         data=floats(RESOURCE_WINDOW_NODES * LABELS_PER_TASK),
@@ -173,24 +173,24 @@ def room_for(num_targets: int) -> Room:
 
 @borrowing_inner
 def best_label(
-    ground: Ground, room: Room, left: int, low: int, high: int, right: int,
+    search: SearchData, work: Workspace, left: int, low: int, high: int, right: int,
     energy: float, data: float, after: After,
 ) -> int:  # fmt: skip
     """Find the path that gains most between two tasks; return its last label.
 
     ``AT_START`` where that is no task at all, ``NOWHERE`` where there is no path.
     """
-    network = ground.network
-    m, size = len(ground.rows), high - low
+    network = search.network
+    m, size = len(search.rows), high - low
     for at in range(size + 1):
-        room.first_idle[at] = -1
+        work.first_idle[at] = -1
     num_idle = 0
     # Labels of tasks ahead of one that must be taken lead nowhere.
     earliest, starts_open = low, False
     best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
-    given = give_between(network, left, right) if right < m else 0.0
+    charged = give_between(network, left, right) if right < m else 0.0
     if (
-        energy + given >= after.need
+        energy + charged >= after.need
         and data <= after.bears
         and (left < 0 or right >= m or may_be_next(network, left, right))
     ):
@@ -200,59 +200,59 @@ def best_label(
         if not starts_open and (left < 0 or network.idle_from[left] <= k):
             starts_open = True
             num_idle = _keep(
-                room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0, num_idle,
+                work.idle_value, work.idle_energy, work.idle_data, work.idle_label, 0, num_idle,
                 0.0, energy, data, AT_START,
             )  # fmt: skip
-        other = room.first_idle[at]
+        other = work.first_idle[at]
         while other >= 0:
             if other + low >= earliest:
                 for i in range(
-                    other * LABELS_PER_TASK, other * LABELS_PER_TASK + room.num_labels[other]
+                    other * LABELS_PER_TASK, other * LABELS_PER_TASK + work.num_labels[other]
                 ):
                     num_idle = _keep(
-                        room.idle_value, room.idle_energy, room.idle_data, room.idle_label, 0,
-                        num_idle, room.value[i], room.energy[i], room.data[i], i,
+                        work.idle_value, work.idle_energy, work.idle_data, work.idle_label, 0,
+                        num_idle, work.value[i], work.energy[i], work.data[i], i,
                     )  # fmt: skip
-            other = room.next_idle[other]
-        room.num_labels[at] = 0
-        if room.gain[at] == NEVER:
+            other = work.next_idle[other]
+        work.num_labels[at] = 0
+        if work.gain[at] == NEVER:
             continue
         begin = at * LABELS_PER_TASK
         count = 0
         for i in range(num_idle):
             count = _extend(
-                ground, room, low, k, begin, count,
-                room.idle_value[i], room.idle_energy[i], room.idle_data[i], room.idle_label[i],
+                search, work, low, k, begin, count,
+                work.idle_value[i], work.idle_energy[i], work.idle_data[i], work.idle_label[i],
             )  # fmt: skip
         for arc in range(network.straight_first[k], network.straight_first[k + 1]):
             i, give = network.straight_rows[arc], network.straight_give[arc]
             if i == left and not starts_open:
                 count = _extend(
-                    ground, room, low, k, begin, count, 0.0, energy + give, data, AT_START
+                    search, work, low, k, begin, count, 0.0, energy + give, data, AT_START
                 )
             elif i >= earliest:
                 first = (i - low) * LABELS_PER_TASK
-                for label in range(first, first + room.num_labels[i - low]):
+                for label in range(first, first + work.num_labels[i - low]):
                     count = _extend(
-                        ground, room, low, k, begin, count,
-                        room.value[label], room.energy[label] + give, room.data[label], label,
+                        search, work, low, k, begin, count,
+                        work.value[label], work.energy[label] + give, work.data[label], label,
                     )  # fmt: skip
-        room.num_labels[at] = count
+        work.num_labels[at] = count
         if network.is_kept[k]:
             num_idle, earliest, starts_open = 0, k, True
             best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
         to = network.idle_from[k] - low
         if count > 0 and to <= size:
-            room.next_idle[at] = room.first_idle[to]
-            room.first_idle[to] = at
+            work.next_idle[at] = work.first_idle[to]
+            work.first_idle[to] = at
         if count > 0 and (right >= m or may_be_next(network, k, right)):
-            given = give_between(network, k, right) if right < m else 0.0
+            charged = give_between(network, k, right) if right < m else 0.0
             for label in range(begin, begin + count):
-                if room.energy[label] + given < after.need or room.data[label] > after.bears:
+                if work.energy[label] + charged < after.need or work.data[label] > after.bears:
                     continue
-                value = room.value[label] - cost_at_end(after, room.data[label])
-                if value > best or (value == best and room.energy[label] > best_energy):
-                    best, best_energy, best_label = value, room.energy[label], label
+                value = work.value[label] - cost_at_end(after, work.data[label])
+                if value > best or (value == best and work.energy[label] > best_energy):
+                    best, best_energy, best_label = value, work.energy[label], label
     return best_label
 
 
@@ -266,30 +266,30 @@ def cost_at_end(after: After, data: float) -> float:
 
 @inlined
 def _extend(
-    ground: Ground, room: Room, low: int, k: int, begin: int, count: int,
+    search: SearchData, work: Workspace, low: int, k: int, begin: int, count: int,
     value: float, energy: float, data: float, label: int,
 ) -> int:  # fmt: skip
     """Take a task after a label; return how many labels the task has then.
 
     ``energy`` is what is left on arrival, with what the way gives back.
     """
-    network = ground.network
+    network = search.network
     if data > network.data_before[k]:
         return count
     energy = min(energy, network.energy_cap[k]) - network.energy_cost[k]
     data = max(network.data_floor[k], data + network.data_gain[k])
     if energy < network.energy_floor[k] or data > network.data_after[k]:
         return count
-    target = ground.target[k]
-    if not network.is_contact[k] and room.seen[target] > 1:
+    target = search.target[k]
+    if not network.is_contact[k] and work.seen[target] > 1:
         before = label
         while before >= 0:
-            if ground.target[low + before // LABELS_PER_TASK] == target:
+            if search.target[low + before // LABELS_PER_TASK] == target:
                 return count
-            before = room.source[before]
+            before = work.source[before]
     return _keep(
-        room.value, room.energy, room.data, room.source, begin, count,
-        value + room.gain[k - low], energy, data, label,
+        work.value, work.energy, work.data, work.source, begin, count,
+        value + work.gain[k - low], energy, data, label,
     )  # fmt: skip
 
 

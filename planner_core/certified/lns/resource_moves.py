@@ -12,9 +12,15 @@ from typing import Final
 import numpy as np
 
 from planner_core.certified.dp.resource_network import give_between
-from planner_core.certified.lns.moves import Taken
-from planner_core.certified.lns.resource_labels import After, Ground, Room, best_label, cost_at_end
-from planner_core.certified.signs import FREE, NEVER, NOWHERE
+from planner_core.certified.lns.moves import Assignment
+from planner_core.certified.lns.resource_labels import (
+    After,
+    SearchData,
+    Workspace,
+    best_label,
+    cost_at_end,
+)
+from planner_core.certified.signs import NEVER, NOWHERE, UNASSIGNED
 from planner_core.certified.sizes import LABELS_PER_TASK, RESOURCE_WINDOW_NODES
 from planner_core.certified.tolerances import ROUNDING, SLIGHT, STAYS
 from planner_core.certified.tuning import TUNING
@@ -23,7 +29,7 @@ from planner_core.jit import borrowing, borrowing_inner
 from planner_core.problem import Bytes
 
 _FEWEST_TASKS, _MOST_TASKS = TUNING.window_tasks
-_FOR_FREE_TARGET: Final = TUNING.aimed
+_FOR_UNASSIGNED: Final = TUNING.aimed
 _TRIALS: Final = TUNING.trials
 _TIE: Final = TUNING.tie
 _CONTACT: Final = TUNING.tight
@@ -31,71 +37,76 @@ _CONTACT: Final = TUNING.tight
 
 @borrowing
 def make_moves(
-    ground: Ground, taken: Taken, room: Room, draws: Uint64s, num_moves: int, stop: Bytes
+    search: SearchData,
+    plan: Assignment,
+    work: Workspace,
+    draws: Uint64s,
+    num_moves: int,
+    stop: Bytes,
 ) -> None:
     """Make moves on one satellite's part of a plan, in place."""
-    m = len(ground.rows)
-    left_cost = ground.network.left_cost
+    m = len(search.rows)
+    left_cost = search.network.left_cost
     if left_cost > 0.0:
-        # At the price itself fewer plans are worth the same, and the search is sooner stuck
+        # At the multiplier itself fewer plans are worth the same, and the search is sooner stuck
         # (docs/bounds.md).
         left_cost *= 2.0 * next_draw(draws)
     for _ in range(num_moves):
         if stop[0] or m == 0:
             break
-        low, high = _window(ground, taken, _pivot(ground, taken, draws), draws)
+        low, high = _window(search, plan, _pivot(search, plan, draws), draws)
         left, right = low - 1, high
-        while left >= 0 and not taken.is_taken[ground.rows[left]]:
+        while left >= 0 and not plan.is_taken[search.rows[left]]:
             left -= 1
-        while right < m and not taken.is_taken[ground.rows[right]]:
+        while right < m and not plan.is_taken[search.rows[right]]:
             right += 1
-        energy, data, is_kept_to = _state_after(ground, taken, left)
-        after = _after(ground, taken, right, _data_end(ground, taken, high), left_cost)
+        energy, data, is_kept_to = _state_after(search, plan, left)
+        after = _after(search, plan, right, _data_end(search, plan, high), left_cost)
         if low >= high or not is_kept_to:
             continue
-        if ground.is_polish:
-            _weigh_liking(ground, taken, room, low, high, draws)
+        if search.is_polish:
+            _weigh_liking(search, plan, work, low, high, draws)
         else:
-            _weigh(ground, taken, room, low, high, draws)
-        last = best_label(ground, room, left, low, high, right, energy, data, after)
+            _weigh(search, plan, work, low, high, draws)
+        last = best_label(search, work, left, low, high, right, energy, data, after)
         if last != NOWHERE:
-            saved = _cost_of(ground, taken, low, high, data, after)
-            saved -= cost_at_end(after, data if last < 0 else room.data[last])
-            _replace(ground, taken, room, low, high, last, saved)
+            saved = _cost_of(search, plan, low, high, data, after)
+            saved -= cost_at_end(after, data if last < 0 else work.data[last])
+            _replace(search, plan, work, low, high, last, saved)
 
 
 @borrowing_inner
-def _pivot(ground: Ground, taken: Taken, draws: Uint64s) -> int:
+def _pivot(search: SearchData, plan: Assignment, draws: Uint64s) -> int:
     """Return a task at random, mostly one of a target that is not imaged."""
-    m = len(ground.rows)
-    num_trials = _TRIALS if next_draw(draws) < _FOR_FREE_TARGET and not ground.is_polish else 1
+    m = len(search.rows)
+    num_trials = _TRIALS if next_draw(draws) < _FOR_UNASSIGNED and not search.is_polish else 1
     pivot = 0
     for _ in range(num_trials):
         pivot = int(next_draw(draws) * m)
-        target = ground.target[pivot]
-        if taken.holder[target] == FREE and ground.worth[ground.rows[pivot]] > 0.0:
+        target = search.target[pivot]
+        if plan.imaged_by[target] == UNASSIGNED and search.worth[search.rows[pivot]] > 0.0:
             break
     return pivot
 
 
 @borrowing_inner
-def _window(ground: Ground, taken: Taken, pivot: int, draws: Uint64s) -> tuple[int, int]:
+def _window(search: SearchData, plan: Assignment, pivot: int, draws: Uint64s) -> tuple[int, int]:
     """Return the tasks between two of the plan, a few apart, around the pivot."""
     num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
     num_before = int(next_draw(draws) * (num_tasks + 1))
     lowest = max(0, pivot - RESOURCE_WINDOW_NODES // 2)
-    highest = min(len(ground.rows), pivot + RESOURCE_WINDOW_NODES // 2)
+    highest = min(len(search.rows), pivot + RESOURCE_WINDOW_NODES // 2)
     low, high = pivot, pivot
     count = 0
     while low > lowest:
-        if taken.is_taken[ground.rows[low - 1]]:
+        if plan.is_taken[search.rows[low - 1]]:
             if count == num_before:
                 break
             count += 1
         low -= 1
     count = 0
     while high < highest:
-        if taken.is_taken[ground.rows[high]]:
+        if plan.is_taken[search.rows[high]]:
             if count == num_tasks - num_before:
                 break
             count += 1
@@ -104,13 +115,13 @@ def _window(ground: Ground, taken: Taken, pivot: int, draws: Uint64s) -> tuple[i
 
 
 @borrowing_inner
-def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float, bool]:
+def _state_after(search: SearchData, plan: Assignment, last: int) -> tuple[float, float, bool]:
     """Return energy and data after the plan's tasks up to one, and whether limits are kept."""
-    network = ground.network
+    network = search.network
     energy, data = network.energy_start, network.data_start
     before = -1
     for k in range(last + 1):
-        if not taken.is_taken[ground.rows[k]]:
+        if not plan.is_taken[search.rows[k]]:
             continue
         if data > network.data_before[k]:
             return energy, data, False
@@ -124,34 +135,36 @@ def _state_after(ground: Ground, taken: Taken, last: int) -> tuple[float, float,
 
 
 @borrowing_inner
-def _data_end(ground: Ground, taken: Taken, high: int) -> float:
+def _data_end(search: SearchData, plan: Assignment, high: int) -> float:
     """Return the most data that may be left at the end, where tasks from ``high`` on stay.
 
     Where the last image must come down that hangs on which one it is. In the window it may be any.
     """
-    network = ground.network
+    network = search.network
     if not network.must_deliver:
         return float(network.data_end)
-    last = len(ground.rows) - 1
+    last = len(search.rows) - 1
     while last >= 0:
-        is_possible = last < high or taken.is_taken[ground.rows[last]]
-        if is_possible and ground.worth[ground.rows[last]] > 0.0:
+        is_possible = last < high or plan.is_taken[search.rows[last]]
+        if is_possible and search.worth[search.rows[last]] > 0.0:
             return float(min(network.data_end, network.delivered[last]))
         last -= 1
     return float(network.data_end)
 
 
 @borrowing_inner
-def _after(ground: Ground, taken: Taken, first: int, data_end: float, left_cost: float) -> After:
+def _after(
+    search: SearchData, plan: Assignment, first: int, data_end: float, left_cost: float
+) -> After:
     """Return what the plan's tasks from one on want, and make of the data."""
-    network = ground.network
+    network = search.network
     need, bears, floor, gain = -np.inf, data_end, -np.inf, 0.0
-    k = len(ground.rows) - 1
+    k = len(search.rows) - 1
     following = -1
     while k >= first:
-        if taken.is_taken[ground.rows[k]]:
-            given = give_between(network, k, following) if following >= 0 else 0.0
-            need = max(need - given, network.energy_floor[k]) + network.energy_cost[k]
+        if plan.is_taken[search.rows[k]]:
+            charged = give_between(network, k, following) if following >= 0 else 0.0
+            need = max(need - charged, network.energy_floor[k]) + network.energy_cost[k]
             following = k
             if need > network.energy_cap[k]:
                 return After(np.inf, bears, floor, gain, left_cost)
@@ -166,96 +179,116 @@ def _after(ground: Ground, taken: Taken, first: int, data_end: float, left_cost:
 
 
 @borrowing_inner
-def _cost_of(ground: Ground, taken: Taken, low: int, high: int, data: float, after: After) -> float:
+def _cost_of(
+    search: SearchData, plan: Assignment, low: int, high: int, data: float, after: After
+) -> float:
     """Return what the data costs that stays at the end with the window's tasks as they are."""
-    network = ground.network
+    network = search.network
     if after.left_cost == 0.0:
         return 0.0
     for k in range(low, high):
-        if taken.is_taken[ground.rows[k]]:
+        if plan.is_taken[search.rows[k]]:
             data = max(network.data_floor[k], data + network.data_gain[k])
     return cost_at_end(after, data)
 
 
 @borrowing_inner
-def _weigh(ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s) -> None:
+def _weigh(
+    search: SearchData,
+    plan: Assignment,
+    work: Workspace,
+    low: int,
+    high: int,
+    draws: Uint64s,
+) -> None:
     """Say what each task of a window adds to a path, and which targets come up repeatedly.
 
     Ties are broken at random, so that the search wanders over plans of equal worth; with more
     noise over such as are worth less.
     """
-    move = room.move[0] + 1
-    room.move[0] = move
-    with_others, noise = next_draw(draws) < 0.5, _TIE + ground.noise
+    move = work.move[0] + 1
+    work.move[0] = move
+    with_others, noise = next_draw(draws) < 0.5, _TIE + search.noise
     for k in range(low, high):
         at = k - low
-        target = ground.target[k]
-        if ground.network.is_contact[k]:
-            room.gain[at] = (
-                NEVER if ground.is_shut[k] else -_CONTACT * ground.typical * next_draw(draws)
+        target = search.target[k]
+        if search.network.is_contact[k]:
+            work.gain[at] = (
+                NEVER if search.is_shut[k] else -_CONTACT * search.typical * next_draw(draws)
             )
             continue
-        if room.marked_at[target] != move:
-            room.marked_at[target] = move
-            room.seen[target] = 0
-        room.seen[target] += 1
-        held = taken.holder[target]
-        is_here = held != FREE and ground.satellite[held] == ground.number
+        if work.marked_at[target] != move:
+            work.marked_at[target] = move
+            work.seen[target] = 0
+        work.seen[target] += 1
+        held = plan.imaged_by[target]
+        is_here = held != UNASSIGNED and search.satellite[held] == search.number
         if is_here:
-            is_here = low <= ground.local[held] < high
-        worth = ground.worth[ground.rows[k]]
-        if held == FREE or is_here:
-            room.gain[at] = worth * (1.0 + noise * next_draw(draws)) if worth > 0.0 else NEVER
-        elif with_others and not ground.is_locked[target]:
-            better = worth - ground.worth[held]
-            room.gain[at] = better + worth * noise * next_draw(draws)
+            is_here = low <= search.local[held] < high
+        worth = search.worth[search.rows[k]]
+        if held == UNASSIGNED or is_here:
+            work.gain[at] = worth * (1.0 + noise * next_draw(draws)) if worth > 0.0 else NEVER
+        elif with_others and not search.is_locked[target]:
+            better = worth - search.worth[held]
+            work.gain[at] = better + worth * noise * next_draw(draws)
         else:
-            room.gain[at] = NEVER
-        if ground.network.is_kept[k]:
-            room.gain[at] = max(room.gain[at], 0.0)
+            work.gain[at] = NEVER
+        if search.network.is_kept[k]:
+            work.gain[at] = max(work.gain[at], 0.0)
 
 
 @borrowing_inner
 def _weigh_liking(
-    ground: Ground, taken: Taken, room: Room, low: int, high: int, draws: Uint64s
+    search: SearchData,
+    plan: Assignment,
+    work: Workspace,
+    low: int,
+    high: int,
+    draws: Uint64s,
 ) -> None:
     """Say the same for a polish: worth above all, then what is liked; contacts stay as they are.
 
     Half of the moves leave out targets that the plan does not image: where a window could earn
     more with them, the others would find nothing that is worth the same.
     """
-    move = room.move[0] + 1
-    room.move[0] = move
+    move = work.move[0] + 1
+    work.move[0] = move
     with_free = next_draw(draws) < 0.5
-    slight = SLIGHT * ground.typical
+    slight = SLIGHT * search.typical
     for k in range(low, high):
-        at, row = k - low, ground.rows[k]
-        target = ground.target[k]
-        if ground.network.is_contact[k]:
-            room.gain[at] = STAYS * ground.typical if taken.is_taken[row] else NEVER
+        at, row = k - low, search.rows[k]
+        target = search.target[k]
+        if search.network.is_contact[k]:
+            work.gain[at] = STAYS * search.typical if plan.is_taken[row] else NEVER
             continue
-        if room.marked_at[target] != move:
-            room.marked_at[target] = move
-            room.seen[target] = 0
-        room.seen[target] += 1
-        held = taken.holder[target]
-        worth, liking = ground.worth[row], ground.liking[row]
-        is_here = held != FREE and ground.satellite[held] == ground.number
+        if work.marked_at[target] != move:
+            work.marked_at[target] = move
+            work.seen[target] = 0
+        work.seen[target] += 1
+        held = plan.imaged_by[target]
+        worth, liking = search.worth[row], search.liking[row]
+        is_here = held != UNASSIGNED and search.satellite[held] == search.number
         if is_here:
-            is_here = low <= ground.local[held] < high
-        if (held == FREE and with_free) or is_here:
-            room.gain[at] = worth + slight * (1.0 + liking) if worth > 0.0 else NEVER
-        elif held != FREE and not ground.is_locked[target]:
-            room.gain[at] = worth - ground.worth[held] + slight * (liking - ground.liking[held])
+            is_here = low <= search.local[held] < high
+        if (held == UNASSIGNED and with_free) or is_here:
+            work.gain[at] = worth + slight * (1.0 + liking) if worth > 0.0 else NEVER
+        elif held != UNASSIGNED and not search.is_locked[target]:
+            work.gain[at] = worth - search.worth[held] + slight * (liking - search.liking[held])
         else:
-            room.gain[at] = NEVER
-        if ground.network.is_kept[k]:
-            room.gain[at] = max(room.gain[at], 0.0)
+            work.gain[at] = NEVER
+        if search.network.is_kept[k]:
+            work.gain[at] = max(work.gain[at], 0.0)
 
 
 @borrowing_inner
 def _replace(
-    ground: Ground, taken: Taken, room: Room, low: int, high: int, last: int, saved: float
+    search: SearchData,
+    plan: Assignment,
+    work: Workspace,
+    low: int,
+    high: int,
+    last: int,
+    saved: float,
 ) -> None:
     """Let a path take the place of what is in the window, unless the plan is worth less then.
 
@@ -266,50 +299,50 @@ def _replace(
     saved
         What less data at the end is worth.
     """
-    place = ground.target
+    site = search.target
     num_new, worth = 0, saved
     liking, num_contacts = 0.0, 0
     label = last
     while label >= 0:
         k = low + label // LABELS_PER_TASK
-        room.path[num_new] = k
+        work.path[num_new] = k
         num_new += 1
-        if not ground.network.is_contact[k]:
-            held = taken.holder[place[k]]
-            worth += ground.worth[ground.rows[k]]
-            liking += ground.liking[ground.rows[k]]
-            if held != FREE and not (
-                ground.satellite[held] == ground.number and low <= ground.local[held] < high
+        if not search.network.is_contact[k]:
+            held = plan.imaged_by[site[k]]
+            worth += search.worth[search.rows[k]]
+            liking += search.liking[search.rows[k]]
+            if held != UNASSIGNED and not (
+                search.satellite[held] == search.number and low <= search.local[held] < high
             ):
-                worth -= ground.worth[held]
-                liking -= ground.liking[held]
+                worth -= search.worth[held]
+                liking -= search.liking[held]
         else:
             num_contacts += 1
-        label = room.source[label]
+        label = work.source[label]
     num_old = 0
     for k in range(low, high):
-        if taken.is_taken[ground.rows[k]]:
-            room.old[num_old] = k
+        if plan.is_taken[search.rows[k]]:
+            work.old[num_old] = k
             num_old += 1
-            if not ground.network.is_contact[k]:
-                worth -= ground.worth[ground.rows[k]]
-                liking -= ground.liking[ground.rows[k]]
+            if not search.network.is_contact[k]:
+                worth -= search.worth[search.rows[k]]
+                liking -= search.liking[search.rows[k]]
             else:
                 num_contacts -= 1
-    if worth < -ROUNDING - ground.noise * ground.typical:
+    if worth < -ROUNDING - search.noise * search.typical:
         return
-    if ground.is_polish and (worth > ROUNDING or liking <= ROUNDING or num_contacts != 0):
+    if search.is_polish and (worth > ROUNDING or liking <= ROUNDING or num_contacts != 0):
         return
     for i in range(num_old):
-        k = room.old[i]
-        taken.is_taken[ground.rows[k]] = False
-        if not ground.network.is_contact[k]:
-            taken.holder[place[k]] = FREE
+        k = work.old[i]
+        plan.is_taken[search.rows[k]] = False
+        if not search.network.is_contact[k]:
+            plan.imaged_by[site[k]] = UNASSIGNED
     for i in range(num_new):
-        k = room.path[i]
-        if not ground.network.is_contact[k]:
-            held = taken.holder[place[k]]
-            if held != FREE:
-                taken.is_taken[held] = False
-            taken.holder[place[k]] = ground.rows[k]
-        taken.is_taken[ground.rows[k]] = True
+        k = work.path[i]
+        if not search.network.is_contact[k]:
+            held = plan.imaged_by[site[k]]
+            if held != UNASSIGNED:
+                plan.is_taken[held] = False
+            plan.imaged_by[site[k]] = search.rows[k]
+        plan.is_taken[search.rows[k]] = True

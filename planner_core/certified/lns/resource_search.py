@@ -12,10 +12,10 @@ from planner_core.certified.dp.resource_network import (
     strict_network_of,
     worth_before_left,
 )
-from planner_core.certified.lns.moves import Taken
-from planner_core.certified.lns.resource_labels import Ground, room_for
+from planner_core.certified.lns.moves import Assignment
+from planner_core.certified.lns.resource_labels import SearchData, workspace_for
 from planner_core.certified.lns.resource_moves import make_moves
-from planner_core.certified.signs import FREE
+from planner_core.certified.signs import UNASSIGNED
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
 from planner_core.precedence.relation import is_transitive
@@ -37,21 +37,21 @@ class ResourceWindows:
         self._problem = problem
         self._draws = draws_of(seed)
         num_targets = len(problem.target_ids)
-        self._room = room_for(num_targets)
+        self._workspace = workspace_for(num_targets)
         self._turn = 0
         is_locked = _locked_targets(problem)
         self._worths = worth_before_left(problem)
         table = problem.opportunities
         self._contacts = np.flatnonzero(table.kind == CONTACT)
         self._shut_by, self._is_shut = self._contacts[:0], dict[int, Bools]()
-        self._grounds = [
-            Ground(
+        self._searches = [
+            SearchData(
                 network=strict_network_of(problem, satellite),
                 rows=satellite.rows,
                 local=problem.local_row,
                 satellite=table.satellite,
                 number=index,
-                target=np.where(satellite.kind == COLLECT, satellite.place, num_targets).astype(
+                target=np.where(satellite.kind == COLLECT, satellite.site, num_targets).astype(
                     np.int32
                 ),
                 worth=self._worths,
@@ -79,15 +79,15 @@ class ResourceWindows:
         """
         # The referee sees each step: what a slow satellite needs on its way it will tell.
         kept = _kept_targets(self._problem)
-        self._grounds = [
-            ground._replace(
-                network=ground.network._replace(left_cost=0.0),
+        self._searches = [
+            search._replace(
+                network=search.network._replace(left_cost=0.0),
                 worth=worth,
                 liking=liking,
                 is_locked=kept,
                 is_polish=True,
             )
-            for ground in self._grounds
+            for search in self._searches
         ]
 
     def adopt(self, plan: Plan) -> None:
@@ -95,20 +95,20 @@ class ResourceWindows:
         table = self._problem.opportunities
         is_taken = np.zeros(len(table), dtype=np.bool_)
         is_taken[plan.columns.row] = True
-        holder = np.full(len(self._problem.target_ids) + 1, FREE, dtype=np.int32)
+        imaged_by = np.full(len(self._problem.target_ids) + 1, UNASSIGNED, dtype=np.int32)
         # The best image of a target counts, and the first of those.
         images = np.flatnonzero(is_taken & (table.kind == COLLECT))[::-1]
         images = images[np.argsort(self._worths[images], kind="stable")]
-        holder[table.place[images]] = images
-        self._taken = Taken(is_taken=is_taken, holder=holder)
+        imaged_by[table.site[images]] = images
+        self._assignment = Assignment(is_taken=is_taken, imaged_by=imaged_by)
         self._note_contacts()
 
     def make_moves(self, num_moves: int, budget: Budget) -> None:
         """Make at most so many moves, fewer where tasks are few or the budget is spent before."""
-        while self._grounds and num_moves > 0 and not budget.is_spent():
-            ground = self._grounds[self._turn % len(self._grounds)]
+        while self._searches and num_moves > 0 and not budget.is_spent():
+            search = self._searches[self._turn % len(self._searches)]
             self._turn += 1
-            self._make_moves_on(ground, min(num_moves, _in_a_step(ground)), budget)
+            self._make_moves_on(search, min(num_moves, _in_a_step(search)), budget)
             num_moves -= TUNING.moves_in_a_step
 
     def make_moves_on_each(self, num_moves: float, budget: Budget) -> None:
@@ -116,14 +116,14 @@ class ResourceWindows:
 
         Where that is less than one, one move on such a share of them, which take turns.
         """
-        grounds, each = self._grounds, max(1, int(num_moves))
+        searches, each = self._searches, max(1, int(num_moves))
         if num_moves < 1.0:
-            first, self._turn = self._turn, self._turn + max(1, round(num_moves * len(grounds)))
-            grounds = [grounds[turn % len(grounds)] for turn in range(first, self._turn)]
-        for ground in grounds:
+            first, self._turn = self._turn, self._turn + max(1, round(num_moves * len(searches)))
+            searches = [searches[turn % len(searches)] for turn in range(first, self._turn)]
+        for search in searches:
             if budget.is_spent():
                 break
-            self._make_moves_on(ground, min(each, TUNING.patience * _in_a_step(ground)), budget)
+            self._make_moves_on(search, min(each, TUNING.patience * _in_a_step(search)), budget)
 
     def anneal(self, num_moves: float, budget: Budget) -> None:
         """Make so many moves on each satellite at each level of noise; the better plan stays.
@@ -136,26 +136,26 @@ class ResourceWindows:
         """
         known, plan = self.reward, self.plan
         for noise in (*np.geomspace(1.0, TUNING.little, TUNING.rounds - 1).tolist(), 0.0):
-            self._grounds = [ground._replace(noise=noise) for ground in self._grounds]
+            self._searches = [search._replace(noise=noise) for search in self._searches]
             self.make_moves_on_each(num_moves, budget)
         if self.reward < known:
             self.adopt(plan)
 
-    def _make_moves_on(self, ground: Ground, num_moves: int, budget: Budget) -> None:
-        ground = ground._replace(is_shut=self._shut(ground))
-        make_moves(ground, self._taken, self._room, self._draws, num_moves, budget.stop)
+    def _make_moves_on(self, search: SearchData, num_moves: int, budget: Budget) -> None:
+        search = search._replace(is_shut=self._shut(search))
+        make_moves(search, self._assignment, self._workspace, self._draws, num_moves, budget.stop)
 
     def _note_contacts(self) -> None:
         """Forget what contacts shut, where these are no longer those of the plan."""
-        taken = self._contacts[self._taken.is_taken[self._contacts]]
+        taken = self._contacts[self._assignment.is_taken[self._contacts]]
         if not np.array_equal(taken, self._shut_by):
             self._shut_by, self._is_shut = taken, {}
 
-    def _shut(self, ground: Ground) -> Bools:
+    def _shut(self, search: SearchData) -> Bools:
         """Return the tasks of a satellite whose antenna another one holds."""
-        if not ground.is_polish:  # which moves no contact
+        if not search.is_polish:  # which moves no contact
             self._note_contacts()
-        index, taken = ground.number, self._shut_by
+        index, taken = search.number, self._shut_by
         if index not in self._is_shut:
             satellite = self._problem.satellites[index]
             others = taken[self._problem.opportunities.satellite[taken] != index]
@@ -166,14 +166,14 @@ class ResourceWindows:
     @property
     def plan(self) -> Plan:
         """The plan as it is now."""
-        return Plan.of(self._problem, np.flatnonzero(self._taken.is_taken).tolist())
+        return Plan.of(self._problem, np.flatnonzero(self._assignment.is_taken).tolist())
 
     @property
     def reward(self) -> float:
         """What its targets earn, less what data costs that stays on board."""
-        held, taken = self._taken.holder[:-1], self._taken.is_taken
-        left = [cost_on_board(one.network, taken[one.rows]) for one in self._grounds]
-        return float(self._worths[held[held != FREE]].sum()) - sum(left)
+        held, taken = self._assignment.imaged_by[:-1], self._assignment.is_taken
+        left = [cost_on_board(one.network, taken[one.rows]) for one in self._searches]
+        return float(self._worths[held[held != UNASSIGNED]].sum()) - sum(left)
 
 
 def _locked_targets(problem: Problem) -> Bools:
@@ -189,10 +189,10 @@ def _kept_targets(problem: Problem) -> Bools:
     """Return which targets have an image that must be taken; the last entry stands for contacts."""
     is_kept = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
     table, kept = problem.opportunities, problem.kept_rows
-    is_kept[table.place[kept[table.kind[kept] == COLLECT]]] = True
+    is_kept[table.site[kept[table.kind[kept] == COLLECT]]] = True
     return is_kept
 
 
-def _in_a_step(ground: Ground) -> int:
+def _in_a_step(search: SearchData) -> int:
     """Return how many moves a satellite has at a time: few where it has few tasks."""
-    return min(TUNING.moves_in_a_step, math.ceil(TUNING.moves_per_task * len(ground.rows)))
+    return min(TUNING.moves_in_a_step, math.ceil(TUNING.moves_per_task * len(search.rows)))

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner_core.bundles import bundle
 from planner_core.jit import borrowing, borrowing_inner
-from planner_core.precedence.time_windows import Spans, View
+from planner_core.precedence.time_windows import TimeWindows, View
 from planner_core.problem import Floats, Ints
 from planner_core.problem.pointing import earliest_start_s, latest_start_s, sight
 
@@ -47,32 +47,32 @@ def empty_route(room: int) -> Route:
 
 
 @borrowing_inner
-def early_after(spans: Spans, view: View, before: int, start_s: float, task: int) -> float:
+def early_after(spans: TimeWindows, view: View, before: int, start_s: float, task: int) -> float:
     """Return the earliest start of a task after another one, or of all (``before`` of -1)."""
     if before < 0:
         return float(spans.open_s[task])
     end_s = start_s + spans.length_s[before]
-    looked = sight(view.path, view.places_m, spans.place[before], end_s)
+    looked = sight(view.path, view.sites_m, spans.site[before], end_s)
     return earliest_start_s(
-        view.agile, end_s, looked, view.path, view.places_m,
-        spans.place[task], spans.open_s[task], spans.close_s[task],
+        view.agile, end_s, looked, view.path, view.sites_m,
+        spans.site[task], spans.open_s[task], spans.close_s[task],
     )  # fmt: skip
 
 
 @borrowing_inner
-def late_before(spans: Spans, view: View, task: int, after: int, start_s: float) -> float:
+def late_before(spans: TimeWindows, view: View, task: int, after: int, start_s: float) -> float:
     """Return the latest start of a task before another one, or of all (``after`` of -1)."""
     if after < 0:
         return float(spans.close_s[task])
-    looks = sight(view.path, view.places_m, spans.place[after], start_s)
+    looks = sight(view.path, view.sites_m, spans.site[after], start_s)
     return latest_start_s(
-        view.agile, start_s, looks, view.path, view.places_m,
-        spans.place[task], spans.length_s[task], spans.open_s[task], spans.close_s[task],
+        view.agile, start_s, looks, view.path, view.sites_m,
+        spans.site[task], spans.length_s[task], spans.open_s[task], spans.close_s[task],
     )  # fmt: skip
 
 
 @borrowing
-def update_early(spans: Spans, view: View, route: Route, first: int, until: int) -> bool:
+def update_early(spans: TimeWindows, view: View, route: Route, first: int, until: int) -> bool:
     """Work out earliest starts from ``first`` on; after ``until`` as long as they change.
 
     Returns whether every task can still start in time.
@@ -91,7 +91,7 @@ def update_early(spans: Spans, view: View, route: Route, first: int, until: int)
 
 
 @borrowing
-def update_late(spans: Spans, view: View, route: Route, last: int, until: int) -> bool:
+def update_late(spans: TimeWindows, view: View, route: Route, last: int, until: int) -> bool:
     """Work out latest starts from ``last`` back; before ``until`` as long as they change."""
     for p in range(last, -1, -1):
         after, start_s = -1, 0.0
@@ -107,7 +107,7 @@ def update_late(spans: Spans, view: View, route: Route, last: int, until: int) -
 
 
 @borrowing
-def remove(spans: Spans, view: View, route: Route, p: int) -> None:
+def remove(spans: TimeWindows, view: View, route: Route, p: int) -> None:
     """Take the task at a position out; what is around it gains."""
     n = route.size[0]
     for q in range(p, n - 1):

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.lns.moves import Ground, Taken, make_moves
-from planner_core.certified.lns.window_chains import room_for
-from planner_core.certified.signs import FREE
+from planner_core.certified.lns.moves import Assignment, SearchData, make_moves
+from planner_core.certified.lns.window_chains import workspace_for
+from planner_core.certified.signs import UNASSIGNED
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
 from planner_core.precedence.network import Network, network_of
@@ -51,9 +51,9 @@ class WindowSearch:
         self.problem = problem
         network = network or network_of(problem)
         self._row = network.row
-        self._ground = _ground_of(problem, network, preference)
+        self._search = _search_data(problem, network, preference)
         self._draws = draws_of(seed)
-        self._room = room_for(len(problem.target_ids))
+        self._workspace = workspace_for(len(problem.target_ids))
         self._every = np.ones(len(self._row), dtype=np.bool_)
         self.adopt(Plan())
 
@@ -63,17 +63,17 @@ class WindowSearch:
         is_taken[[action.opportunity for action in plan.actions]] = True
         is_taken[self.problem.opportunities.kind == CONTACT] = False
         is_taken = is_taken[self._row]
-        holder = np.full(len(self.problem.target_ids) + 1, FREE, dtype=np.int32)
+        imaged_by = np.full(len(self.problem.target_ids) + 1, UNASSIGNED, dtype=np.int32)
         # The best image of a target counts, and the first of those.
         own = np.flatnonzero(is_taken)[::-1]
-        own = own[np.argsort(self._ground.worth[own], kind="stable")]
-        holder[self._ground.network.place[own]] = own
+        own = own[np.argsort(self._search.worth[own], kind="stable")]
+        imaged_by[self._search.network.site[own]] = own
         # Where it need not stand, a second image of a target only takes up room.
-        part = np.searchsorted(self._ground.network.first, own, side="right") - 1
-        is_spare = holder[self._ground.network.place[own]] != own
-        is_spare &= self._ground.is_transitive[part] & ~self._ground.is_kept[own]
+        part = np.searchsorted(self._search.network.first, own, side="right") - 1
+        is_spare = imaged_by[self._search.network.site[own]] != own
+        is_spare &= self._search.is_transitive[part] & ~self._search.is_kept[own]
         is_taken[own[is_spare]] = False
-        self._taken = Taken(is_taken=is_taken, holder=holder)
+        self._assignment = Assignment(is_taken=is_taken, imaged_by=imaged_by)
 
     def make_moves(self, num_moves: int, budget: Budget, offered: Bools | None = None) -> None:
         """Make so many moves, unless the budget is spent before.
@@ -86,7 +86,7 @@ class WindowSearch:
         nodes = self._every if offered is None else offered[self._row]
         while num_moves > 0 and not budget.is_spent():
             make_moves(
-                self._ground, self._taken, nodes, self._room, self._draws,
+                self._search, self._assignment, nodes, self._workspace, self._draws,
                 min(num_moves, TUNING.moves_at_a_time), budget.stop,
             )  # fmt: skip
             num_moves -= TUNING.moves_at_a_time
@@ -94,13 +94,13 @@ class WindowSearch:
     @property
     def plan(self) -> Plan:
         """The plan as it is now."""
-        return Plan.of(self.problem, np.sort(self._row[self._taken.is_taken]).tolist())
+        return Plan.of(self.problem, np.sort(self._row[self._assignment.is_taken]).tolist())
 
     @property
     def reward(self) -> float:
         """What its targets earn."""
-        held = self._taken.holder[:-1]
-        return float(self._ground.worth[held[held != FREE]].sum())
+        held = self._assignment.imaged_by[:-1]
+        return float(self._search.worth[held[held != UNASSIGNED]].sum())
 
 
 def num_choices(problem: Problem) -> int:
@@ -130,14 +130,14 @@ def polished(
     return replace(solution, plan=plan)
 
 
-def _ground_of(problem: Problem, network: Network, preference: Floats | None) -> Ground:
+def _search_data(problem: Problem, network: Network, preference: Floats | None) -> SearchData:
     is_transitive = np.array([is_transitive_on(s) for s in problem.satellites], dtype=np.bool_)
     num_targets = len(problem.target_ids)
     worth = problem.worth[network.row]
     is_kept = np.isin(network.row, problem.kept_rows)
     is_locked = np.zeros(num_targets + 1, dtype=np.bool_)
-    is_locked[network.place[is_kept]] = True
-    return Ground(
+    is_locked[network.site[is_kept]] = True
+    return SearchData(
         network=network,
         is_transitive=is_transitive[network.satellite],
         worth=worth,

@@ -74,7 +74,7 @@ def _down_s(
     order = np.argsort(table.end_s[queue], kind="stable")
     last_s = np.append(0.0, np.maximum.accumulate(queue_down_s[order]))
     before_s = last_s[np.searchsorted(table.end_s[queue][order], table.end_s[images])]
-    ready_s = table.start_s[contacts] + problem.downlinks.stations.setup_s[table.place[contacts]]
+    ready_s = table.start_s[contacts] + problem.downlinks.stations.setup_s[table.site[contacts]]
     useful_s = np.maximum(table.end_s[contacts] - ready_s, 1e-9)
     rate = satellite.volume[problem.local_row[contacts]] / useful_s
     size = (table.end_s - table.start_s)[images] * satellite.resources.collect_fill_per_s
@@ -103,8 +103,8 @@ def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
     beside = [
         other
         for other in chosen
-        if table.place[other] == table.place[row]
+        if table.site[other] == table.site[row]
         and table.start_s[other] < table.end_s[row]
         and table.end_s[other] > table.start_s[row]
     ]
-    return len(beside) < int(problem.station_antennas[table.place[row]])
+    return len(beside) < int(problem.station_antennas[table.site[row]])

@@ -37,7 +37,7 @@ _EMPTY: Final = np.uint64(0)
 
 
 @bundle
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Working memory of a window; shape ``(WINDOW_NODES + 1,)`` for nodes, from its first on.
 
     Attributes
@@ -76,10 +76,10 @@ class Room(NamedTuple):
     move: Longs
 
 
-def room_for(num_targets: int) -> Room:
+def workspace_for(num_targets: int) -> Workspace:
     """Return working memory for a problem of so many targets."""
     nodes = WINDOW_NODES + 1
-    return Room(
+    return Workspace(
         sky=skyline_for(nodes),
         value=np.zeros(nodes),
         source=np.zeros(nodes, dtype=np.int32),
@@ -115,7 +115,7 @@ def follows(network: Network, slews: Slews, a: int, b: int) -> bool:
 
 @borrowing_inner
 def heaviest_chain(
-    network: Network, room: Room, num_words: int,
+    network: Network, work: Workspace, num_words: int,
     part: int, ends: tuple[int, int], low: int, high: int,
 ) -> int:  # fmt: skip
     """Find the heaviest chain between two tasks, or none; return its last label.
@@ -123,7 +123,7 @@ def heaviest_chain(
     ``NO_LABEL`` where that is no task at all, ``NOWHERE`` where the two tasks cannot do
     without any in between.
     """
-    sky, (left, right) = room.sky, ends
+    sky, (left, right) = work.sky, ends
     slews = slews_in(network, part)
     until_s = np.inf
     if right != NO_TASK:
@@ -131,26 +131,26 @@ def heaviest_chain(
     clear(sky)
     count, num_waiting, entered = 0, 0, 0
     for node in range(low, high):
-        target = network.place[node]
-        weight = room.weight[node - low]
+        target = network.site[node]
+        weight = work.weight[node - low]
         if weight <= 0.0 or network.end_s[node] > until_s:
             continue
         start_s = network.start_s[node]
         while entered < num_waiting:
-            k = room.waiting[entered]
+            k = work.waiting[entered]
             if network.end_s[low + k] > start_s - slews.settle_s + TIME_TOLERANCE_S:
                 break
-            count = _enter(network, room, slews, low, k, count, num_words)
+            count = _enter(network, work, slews, low, k, count, num_words)
             entered += 1
-        at = _best_without(network, room, slews, node, room.number[target], num_words)
+        at = _best_without(network, work, slews, node, work.number[target], num_words)
         if at == NO_LABEL and left != NO_TASK and not follows(network, slews, left, node):
             continue
-        room.value[node - low] = value_of(sky, at) + weight
-        room.source[node - low] = at
-        _wait(network, room, low, node - low, entered, num_waiting)
+        work.value[node - low] = value_of(sky, at) + weight
+        work.source[node - low] = at
+        _wait(network, work, low, node - low, entered, num_waiting)
         num_waiting += 1
     while entered < num_waiting:
-        count = _enter(network, room, slews, low, room.waiting[entered], count, num_words)
+        count = _enter(network, work, slews, low, work.waiting[entered], count, num_words)
         entered += 1
     if right == NO_TASK:
         return top_label(sky)
@@ -161,35 +161,43 @@ def heaviest_chain(
 
 
 @borrowing_inner
-def _wait(network: Network, room: Room, low: int, k: int, entered: int, num_waiting: int) -> None:
+def _wait(
+    network: Network, work: Workspace, low: int, k: int, entered: int, num_waiting: int
+) -> None:
     """Put a node among those that wait, in order of end."""
     at = num_waiting
-    while at > entered and network.end_s[low + room.waiting[at - 1]] > network.end_s[low + k]:
-        room.waiting[at] = room.waiting[at - 1]
+    while at > entered and network.end_s[low + work.waiting[at - 1]] > network.end_s[low + k]:
+        work.waiting[at] = work.waiting[at - 1]
         at -= 1
-    room.waiting[at] = k
+    work.waiting[at] = k
 
 
 @borrowing_inner
 def _enter(
-    network: Network, room: Room, slews: Slews, low: int, k: int, count: int, num_words: int
+    network: Network,
+    work: Workspace,
+    slews: Slews,
+    low: int,
+    k: int,
+    count: int,
+    num_words: int,
 ) -> int:
     """Enter a node's label, with the targets on its chain; return how many labels there are."""
-    node, source, first = low + k, room.source[k], count * num_words
-    value, end_s, looked = room.value[k], network.end_s[node], _looked(network, node)
+    node, source, first = low + k, work.source[k], count * num_words
+    value, end_s, looked = work.value[k], network.end_s[node], _looked(network, node)
     for i in range(num_words):
-        room.on_chain[first + i] = room.on_chain[source * num_words + i] if source >= 0 else _EMPTY
-    number = room.number[network.place[node]]
+        work.on_chain[first + i] = work.on_chain[source * num_words + i] if source >= 0 else _EMPTY
+    number = work.number[network.site[node]]
     if number >= 0:
-        room.on_chain[first + (number >> 6)] |= np.uint64(1) << np.uint64(number & 63)
-    before, at = NO_LABEL, top_label(room.sky)
-    while at >= 0 and value_of(room.sky, at) >= value:
-        if is_as_good(room.sky, at, end_s, looked, slews) and _is_subset(
-            room.on_chain, at * num_words, first, num_words
+        work.on_chain[first + (number >> 6)] |= np.uint64(1) << np.uint64(number & 63)
+    before, at = NO_LABEL, top_label(work.sky)
+    while at >= 0 and value_of(work.sky, at) >= value:
+        if is_as_good(work.sky, at, end_s, looked, slews) and _is_subset(
+            work.on_chain, at * num_words, first, num_words
         ):
             return count
-        before, at = at, next_label(room.sky, at)
-    insert(room.sky, count, before, value, end_s, looked, k)
+        before, at = at, next_label(work.sky, at)
+    insert(work.sky, count, before, value, end_s, looked, k)
     return count + 1
 
 
@@ -203,16 +211,16 @@ def _is_subset(words: npt.NDArray[np.uint64], one: int, other: int, num_words: i
 
 @borrowing_inner
 def _best_without(
-    network: Network, room: Room, slews: Slews, node: int, number: int, num_words: int
+    network: Network, work: Workspace, slews: Slews, node: int, number: int, num_words: int
 ) -> int:
     """Return the best label that a node may follow and whose chain has not got its target."""
-    sky, start_s, looks = room.sky, network.start_s[node], _looks(network, node)
+    sky, start_s, looks = work.sky, network.start_s[node], _looks(network, node)
     if number < 0:
         return best_ahead(sky, start_s, looks, slews)
     bit = np.uint64(1) << np.uint64(number & 63)
     at = top_label(sky)
     while at >= 0 and (
-        room.on_chain[at * num_words + (number >> 6)] & bit
+        work.on_chain[at * num_words + (number >> 6)] & bit
         or not reaches(sky, at, start_s, looks, slews)
     ):
         at = next_label(sky, at)

@@ -1,7 +1,7 @@
 """Sets of tasks of one satellite that exclude each other: what a plan takes one of at most.
 
 Rows are those of one satellite. Two tasks exclude each other when the order does not relate
-them; a set of such tasks is an antichain.
+them; a set of such tasks is an clique.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def _first_near(precedence: Precedence) -> Ints:
 
 
 @kernel
-def antichain_cover(precedence: Precedence) -> tuple[Longs, Ints]:
-    """Return antichains that together hold every pair of tasks that exclude each other.
+def clique_cover(precedence: Precedence) -> tuple[Longs, Ints]:
+    """Return cliques that together hold every pair of tasks that exclude each other.
 
     Greedy: each pair not yet covered is extended, in order of time, by every task that
     excludes all members so far. Answers offsets, and the members of all of them.
@@ -94,10 +94,10 @@ def _extend(precedence: Precedence, clique: Ints, size: int, from_row: int, to_r
 
 
 @kernel
-def violated_antichains(precedence: Precedence, taken: Floats) -> tuple[Longs, Ints]:
-    """Return antichains of which a fractional plan takes more than one task.
+def violated_cliques(precedence: Precedence, taken: Floats) -> tuple[Longs, Ints]:
+    """Return cliques of which a fractional plan takes more than one task.
 
-    For each fractional task: the most taken antichain in which it is the first, if that is
+    For each fractional task: the most taken clique in which it is the first, if that is
     too much, made as large as it can be.
 
     Parameters
@@ -113,7 +113,7 @@ def violated_antichains(precedence: Precedence, taken: Floats) -> tuple[Longs, I
     for row in range(m):
         if taken[row] <= CLIQUE_BROKEN or taken[row] >= 1.0 - CLIQUE_BROKEN:
             continue
-        size, total = _heaviest_antichain(precedence, taken, row, clique)
+        size, total = _heaviest_clique(precedence, taken, row, clique)
         if total <= 1.0 + CLIQUE_BROKEN:
             continue
         size = _extend(precedence, clique, size, first_near[row], precedence.far_from[row])
@@ -125,13 +125,13 @@ def violated_antichains(precedence: Precedence, taken: Floats) -> tuple[Longs, I
 
 
 @inner
-def _heaviest_antichain(
+def _heaviest_clique(
     precedence: Precedence, taken: Floats, row: int, clique: Ints
 ) -> tuple[int, float]:
-    """Fill ``clique`` with ``row`` and the heaviest antichain of taken tasks beside it.
+    """Fill ``clique`` with ``row`` and the heaviest clique of taken tasks beside it.
 
     Depth first over the candidates by falling weight, with the sum of what remains as the
-    bound; cut short where that would take long, for a good antichain is enough.
+    bound; cut short where that would take long, for a good clique is enough.
     """
     others = np.empty(max(0, precedence.far_from[row] - row - 1), dtype=np.int32)
     falling = np.empty(len(others))

@@ -1,7 +1,7 @@
 """The best plan with given contacts, by mixed-integer programming over promising tasks.
 
 With its contacts fixed the linear relaxation is nearly tight; with contacts free it is not. Its
-prices are nearly the best for all plans, and the tasks that it takes at no or little loss hold
+multipliers are nearly the best for all plans, and the tasks that it takes at no or little loss hold
 good plans.
 """
 
@@ -15,7 +15,7 @@ import highspy
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.mip.clique_cuts import violated_antichains
+from planner_core.certified.mip.clique_cuts import violated_cliques
 from planner_core.certified.mip.highs import Engine
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Rows
@@ -47,7 +47,7 @@ class _Point(NamedTuple):
 
     value: float
     columns: Floats
-    row_prices: Floats
+    row_duals: Floats
     losses: Floats
 
 
@@ -66,9 +66,9 @@ class _Engine(Engine):
         self._highs.setOptionValue("mip_max_start_nodes", 1)
 
     def central(self) -> _Point | None:
-        """Return a point amid all optima, with prices that are amid all that prove them.
+        """Return a point amid all optima, with multipliers that are amid all that prove them.
 
-        Such prices hold for other contacts as well, better than those of a corner. HiGHS has
+        Such multipliers hold for other contacts as well, better than those of a corner. HiGHS has
         the sign of them right where it minimizes.
         """
         highs = self._highs
@@ -100,7 +100,7 @@ class _Engine(Engine):
         return _Point(
             value=value,
             columns=np.array(solution.col_value),
-            row_prices=self.row_prices,
+            row_duals=self.row_duals,
             losses=np.abs(np.array(solution.col_dual)),
         )
 
@@ -112,15 +112,15 @@ class Relaxation:
     Attributes
     ----------
     value
-        With antichain cuts; minus infinity where there is no point.
-    prices
+        With clique cuts; minus infinity where there is no point.
+    multipliers
         What it says that each target is worth by itself. Shape ``(num_targets,)``.
     losses
         What taking an opportunity would cost; infinite where it may not. Shape ``(n,)``.
     """
 
     value: float
-    prices: Floats
+    multipliers: Floats
     losses: Floats
 
 
@@ -159,21 +159,21 @@ class FixedContacts:
         self._point: Floats | None = None  # of the last relaxation
 
     def relaxation(self, num_rounds: int = TUNING.tries) -> Relaxation:
-        """Return what the relaxation tells, with prices amid all that prove it.
+        """Return what the relaxation tells, with multipliers amid all that prove it.
 
         Parameters
         ----------
         num_rounds
             Of cutting planes.
         """
-        prices = np.zeros(len(self._problem.target_ids))
+        multipliers = np.zeros(len(self._problem.target_ids))
         losses = np.full(len(self._problem.opportunities), np.inf)
         point = self._cut(num_rounds, self._engine.central)
         if point is not None:
-            prices = self._model.target_prices(point.row_prices)
+            multipliers = self._model.target_multipliers(point.row_duals)
             losses[self._rows] = point.losses[: len(self._rows)]
         value = -np.inf if point is None else point.value
-        return Relaxation(value=value, prices=prices, losses=losses)
+        return Relaxation(value=value, multipliers=multipliers, losses=losses)
 
     def relaxed(self) -> float:
         """Return what the relaxation is worth: a corner, from which the search sets out."""
@@ -213,7 +213,7 @@ class FixedContacts:
         return is_fixed
 
     def _limit(self, is_fixed: Bools) -> None:
-        """Fix tasks, and let rows alone limit the collects, so that they get all prices."""
+        """Fix tasks, and let rows alone limit the collects, so that they get all multipliers."""
         program, m = self._model.program, len(is_fixed)
         lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
         if self._model.paid is None:
@@ -223,7 +223,7 @@ class FixedContacts:
         program.lower, program.upper = [lower], [upper]
 
     def _cut(self, rounds: int, solve: Callable[[], _Point | None]) -> _Point | None:
-        """Return the optimum of the relaxation with antichain cuts, if there is one."""
+        """Return the optimum of the relaxation with clique cuts, if there is one."""
         for left in range(rounds, -1, -1):
             point = solve()
             if point is None or left == 0 or not self._add_cuts(point.columns):
@@ -237,7 +237,7 @@ class FixedContacts:
             if len(satellite) == 0:
                 continue
             own = self._model.taken[satellite.rows]
-            offsets, members = violated_antichains(precedence, taken[own])
+            offsets, members = violated_cliques(precedence, taken[own])
             cuts = Rows.of(offsets, own[members], upper=1.0)
             self._engine.add_rows(cuts)
             self._cuts.append(cuts)

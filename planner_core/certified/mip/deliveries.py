@@ -58,7 +58,7 @@ def _add_satellite(
     if len(image) == 0:
         return
     of_image, contact = images[image], contacts[place]
-    ready_s = table.start_s[contact] + problem.downlinks.stations.setup_s[table.place[contact]]
+    ready_s = table.start_s[contact] + problem.downlinks.stations.setup_s[table.site[contact]]
     age_s = ready_s - table.end_s[of_image]
     earned = problem.worth_on_ground[of_image] * share_earned(problem.objective, age_s)
     gain = np.minimum(earned, problem.worth[of_image]) - on_board[of_image]

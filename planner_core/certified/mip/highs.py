@@ -124,10 +124,10 @@ class Engine:
         return self._bound
 
     @property
-    def row_prices(self) -> Floats:
+    def row_duals(self) -> Floats:
         """What the last relaxation would gain by one more of each row's limit."""
-        prices: Floats = np.abs(np.array(self._highs.getSolution().row_dual))
-        return prices
+        multipliers: Floats = np.abs(np.array(self._highs.getSolution().row_dual))
+        return multipliers
 
     @property
     def log(self) -> str:

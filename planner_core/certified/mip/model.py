@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from planner_core.certified.dp.resource_network import must_deliver, worth_before_left
-from planner_core.certified.mip.clique_cuts import antichain_cover, detours, excluding_pairs
+from planner_core.certified.mip.clique_cuts import clique_cover, detours, excluding_pairs
 from planner_core.certified.mip.deliveries import add_deliveries
 from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.resource_terms import ResourceTerms, resource_terms
@@ -36,8 +36,8 @@ from planner_core.problem.restrict import restricted
 Formulation = Literal["antichain", "pairwise"]
 OnBoard = Literal["worth less", "priced", "worth the same"]
 """What images that stay on board do: each has a column that says so, and others for when it comes
-down if it ages; or what a recorder holds at the end has one price; or they are worth the most they
-can."""
+down if it ages; or what a recorder holds at the end has one multiplier; or they are worth the most
+they can."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,18 +64,18 @@ class PlanProgram:
     precedences: tuple[Precedence, ...]
     paid: Paid | None
 
-    def target_prices(self, row_prices: Floats) -> Floats:
+    def target_multipliers(self, row_duals: Floats) -> Floats:
         """Return what a relaxation says that each target is worth by itself.
 
         Rows of targets come first in the program.
         """
         most = self.problem.best_worth
         if self.paid is None:
-            return np.clip(row_prices[: len(most)], 0.0, most)
-        prices = np.zeros(len(most))
-        left = self.paid.worth - row_prices[: len(self.paid.worth)]
-        np.maximum.at(prices, self.paid.target, left)
-        return np.clip(prices, 0.0, most)
+            return np.clip(row_duals[: len(most)], 0.0, most)
+        multipliers = np.zeros(len(most))
+        left = self.paid.worth - row_duals[: len(self.paid.worth)]
+        np.maximum.at(multipliers, self.paid.target, left)
+        return np.clip(multipliers, 0.0, most)
 
 
 class Paid(NamedTuple):
@@ -102,7 +102,7 @@ class Paid(NamedTuple):
         """Return the groups of a problem, target after target."""
         rows, offsets = problem.target_opportunities
         empty = np.flatnonzero(np.diff(offsets) == 0)
-        target = np.concatenate([problem.opportunities.place[rows], empty])
+        target = np.concatenate([problem.opportunities.site[rows], empty])
         own = np.column_stack([problem.worth[rows], lost[rows]])
         own = np.vstack([own, np.zeros((len(empty), 2))])
         groups, group = np.unique(np.column_stack([target, own]), axis=0, return_inverse=True)
@@ -137,7 +137,7 @@ def plan_program(
         What images do that stay on board.
     """
     terms = [
-        resource_terms(problem, satellite, prices_left=on_board == "priced")
+        resource_terms(problem, satellite, costs_left=on_board == "priced")
         if problem.use_resources and len(satellite)
         else None
         for satellite in problem.satellites
@@ -273,7 +273,7 @@ def _agility(program: Program, own: Ints, precedence: Precedence, formulation: F
         first, second = excluding_pairs(precedence)
         program.add_rows(Rows.aligned((own[first], 1.0), (own[second], 1.0), upper=1.0))
     else:
-        offsets, members = antichain_cover(precedence)
+        offsets, members = clique_cover(precedence)
         program.add_rows(Rows.of(offsets, own[members], upper=1.0))
 
 

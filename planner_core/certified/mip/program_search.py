@@ -1,9 +1,9 @@
 """Plans of a fleet under battery and recorder by mixed-integer programs, with contacts drawn.
 
-Near the best prices the relaxed plans of all satellites hold a few thousand tasks between them,
-and the best plans are made of those. With its contacts fixed the program over them is nearly
+Near the best multipliers the relaxed plans of all satellites hold a few thousand tasks between
+them, and the best plans are made of those. With its contacts fixed the program over them is nearly
 tight, and HiGHS finds in seconds what no search from plan to plan does. Which contacts: those of a
-satellite's own best plan at prices that are off by a little, less what it can do without, one
+satellite's own best plan at multipliers that are off by a little, less what it can do without, one
 satellite after another where they share antennas. The relaxation tells good sets from others.
 """
 
@@ -19,7 +19,7 @@ from planner_core.budget import Budget
 from planner_core.certified.dp.resource_network import Network
 from planner_core.certified.mip.contact_sets import FixedContacts
 from planner_core.certified.mip.solution_pool import PlanPool, Rows, rows_of
-from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.resource_bound import leaving_whole_units, whole_worth
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (
@@ -47,8 +47,8 @@ class ProgramSearch:
     ----------
     pool
         Where plans come from, and go.
-    prices
-        The satellites' programmes, and the best prices.
+    ascent
+        Holds the satellites' programmes and the best multipliers.
     costs
         Says what taking each opportunity costs, as far as that is known by then.
 
@@ -62,22 +62,22 @@ class ProgramSearch:
         self,
         problem: Problem,
         pool: PlanPool,
-        prices: PriceSearch,
+        ascent: ResourceAscent,
         costs: Costs,
         budget: Budget,
         seed: int,
     ) -> None:
         self._problem, self._budget, self._seed = problem, budget, seed
         self._pool = pool
-        self._multipliers = prices
-        self._satellites = prices.satellites
+        self._ascent = ascent
+        self._satellites = ascent.satellites
         self._costs = costs
         self._offered_per_task = TUNING.tasks_per_task
         self._rng = np.random.default_rng(seed)
         self._work = self._steps()
         self.steps_beside = next(self._work, 1)
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Solve a program with the most hopeful contacts that are known, or that are drawn."""
         self.steps_beside = next(self._work, 1)
 
@@ -173,12 +173,12 @@ class ProgramSearch:
         return tuple(np.flatnonzero(is_one).tolist())
 
     def _draw(self, group: Bools, beside: Rows) -> Rows:
-        """Return contacts that satellites would have in turn, at prices that are a little off."""
+        """Return the contacts that satellites choose in turn at slightly perturbed multipliers."""
         most = self._problem.best_worth
-        known, unit = self._multipliers.prices, self._multipliers.unit
+        known, unit = self._ascent.multipliers, self._ascent.unit
         off = TUNING.near * most * self._rng.standard_normal(len(most)) * (known > 0.0)
-        prices = leaving_whole_units(self._problem, np.clip(known + off, 0.0, most), unit)
-        worth = whole_worth(self._problem, prices, unit, self._multipliers.antenna_prices)
+        multipliers = leaving_whole_units(self._problem, np.clip(known + off, 0.0, most), unit)
+        worth = whole_worth(self._problem, multipliers, unit, self._ascent.antenna_multipliers)
         table = self._problem.opportunities
         taken = [r for r in beside if table.kind[r] == CONTACT]
         drawn: list[int] = []

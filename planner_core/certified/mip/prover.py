@@ -1,4 +1,4 @@
-"""HiGHS on what the prices leave: a plan worth some amount, or the proof that there is none."""
+"""HiGHS on what the multipliers leave open: a plan worth an amount, or the proof of none."""
 
 from __future__ import annotations
 

@@ -121,14 +121,14 @@ class ResourceTerms:
 
 
 def resource_terms(
-    problem: Problem, satellite: SatelliteProblem, *, prices_left: bool
+    problem: Problem, satellite: SatelliteProblem, *, costs_left: bool
 ) -> ResourceTerms:
     """Return the terms of a satellite that has opportunities.
 
     Parameters
     ----------
-    prices_left
-        Whether what stays on board has a price, as in the other searches (``left_cost``).
+    costs_left
+        Whether what stays on board has a multiplier, as in the other searches (``left_cost``).
     """
     terms = (
         physical_terms(problem, satellite)
@@ -137,7 +137,7 @@ def resource_terms(
     )
     if must_deliver(problem, satellite):
         return replace(terms, delivered=network_of(problem, satellite).delivered)
-    if prices_left:
+    if costs_left:
         return replace(terms, left_cost=left_cost(problem, satellite))
     if problem.counts_delivery:
         return replace(terms, comes_down=network_of(problem, satellite).data_floor)

@@ -56,7 +56,7 @@ def add_resources(
         _add_delivery(program, satellite, terms.delivered, level, taken)
     _add_shares(program, terms, level, taken, down, margin)
     if terms.left_cost > 0.0:
-        _add_price(program, satellite, terms.left_cost, level)
+        _add_cost_of_data_left(program, satellite, terms.left_cost, level)
 
 
 def _add_battery(
@@ -185,10 +185,10 @@ def _add_shares(
     )
 
 
-def _add_price(
+def _add_cost_of_data_left(
     program: Program, satellite: SatelliteProblem, left_cost: float, level: Ints
 ) -> None:
-    """Let what the recorder holds at the end, beyond what it did at the start, have its price."""
+    """Charge for data that the recorder holds at the end beyond what it held at the start."""
     start = max(satellite.resources.initial_recorder_fraction, 0.0)
     left = program.add_columns(np.array([-left_cost]), lower=-start, upper=np.inf, is_integer=False)
     program.add_rows(Rows.aligned((left, 1.0), (level[-1:], -1.0), lower=-start))

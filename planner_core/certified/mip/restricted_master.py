@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.mip.clique_cuts import antichain_cover, violated_antichains
+from planner_core.certified.mip.clique_cuts import clique_cover, violated_cliques
 from planner_core.certified.mip.highs import Engine
 from planner_core.certified.mip.program import Program, Rows
-from planner_core.certified.mip.zero_half_cuts import Sets, deepest, odd_sets
+from planner_core.certified.mip.zero_half_cuts import Sets, deepest, zero_half_cuts
 from planner_core.certified.proofs.certificate import Cut, Multipliers
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of
@@ -29,7 +29,7 @@ from planner_core.problem import (
 
 
 class Master(Engine):
-    """Which tasks to take, fractionally: exclusion sets, odd sets, and their prices.
+    """Which tasks to take, fractionally: exclusion sets, zero-half cuts, and their multipliers.
 
     Paths are not in it: sets of tasks of one satellite that exclude each other say as much,
     and those that matter are few.
@@ -46,7 +46,7 @@ class Master(Engine):
         self._scale = float(problem.worth.max(initial=1e-300))
         self._worth = worth = problem.worth / self._scale
         self._precedences = [
-            _exclusion(transitive_closure(s), s.place, s.kind) for s in problem.satellites
+            _exclusion(transitive_closure(s), s.site, s.kind) for s in problem.satellites
         ]
         self._draws = draws_of(seed)
         self._cuts: dict[tuple[int, ...], Cut] = {}
@@ -54,7 +54,7 @@ class Master(Engine):
         self._sets = Sets(offsets, members)
         self._num_targets = len(offsets) - 1
         for satellite, precedence in zip(problem.satellites, self._precedences, strict=True):
-            cover, rows = antichain_cover(precedence)
+            cover, rows = clique_cover(precedence)
             self._keep_sets(cover, satellite.rows[rows])
         program = Program()
         self._useful = worth > 0.0
@@ -71,24 +71,24 @@ class Master(Engine):
         return float(self._highs.getInfo().objective_function_value) * self._scale
 
     def multipliers(self) -> Multipliers:
-        """Return the prices that the last relaxation has put on targets and cuts."""
+        """Return the multipliers that the last relaxation has put on targets and cuts."""
         rows = self._rows
-        price = self.row_prices * self._scale
-        prices = price[: self._num_targets].copy()
-        place = self._problem.opportunities.place
-        cuts, cut_prices = [], []
-        for row in np.flatnonzero(price > 1e-9 * self._scale):
+        multiplier = self.row_duals * self._scale
+        multipliers = multiplier[: self._num_targets].copy()
+        site = self._problem.opportunities.site
+        cuts, of_cuts = [], []
+        for row in np.flatnonzero(multiplier > 1e-9 * self._scale):
             picked = self._row_sets[row]
             if row < self._num_targets:
                 continue
             groups = [self._members(i) for i in picked]
-            is_on_path = len(groups) == 1 and len(np.unique(place[groups[0]])) == len(groups[0])
+            is_on_path = len(groups) == 1 and len(np.unique(site[groups[0]])) == len(groups[0])
             if not is_on_path:
                 if picked not in self._cuts:
                     self._cuts[picked] = Cut(sets=tuple(rows[group] for group in groups))
                 cuts.append(self._cuts[picked])
-                cut_prices.append(float(price[row]))
-        return Multipliers(prices=prices, cuts=tuple(cuts), cut_prices=tuple(cut_prices))
+                of_cuts.append(float(multiplier[row]))
+        return Multipliers(of_targets=multipliers, cuts=tuple(cuts), of_cuts=tuple(of_cuts))
 
     def allow(self, is_open: Bools) -> None:
         """Allow these tasks, and no others, from now on."""
@@ -97,13 +97,13 @@ class Master(Engine):
         columns = np.arange(n, dtype=np.int32)
         self._highs.changeColsBounds(n, columns, np.zeros(n), upper.astype(np.float64))
 
-    def cut(self, taken: Floats, *, with_odd_sets: bool) -> int:
+    def cut(self, taken: Floats, *, with_zero_half_cuts: bool) -> int:
         """Add what the fractional plan breaks, drop what has long been idle; return what came."""
         self._drop_idle()
         num_before = len(self._row_sets)
-        picked = self._odd_sets(taken) if with_odd_sets else []
+        picked = self._zero_half_cuts(taken) if with_zero_half_cuts else []
         for satellite, precedence in zip(self._problem.satellites, self._precedences, strict=True):
-            offsets, members = violated_antichains(precedence, taken[satellite.rows])
+            offsets, members = violated_cliques(precedence, taken[satellite.rows])
             if len(offsets) > 1:
                 first = len(self._sets.offsets) - 1
                 self._keep_sets(offsets, satellite.rows[members])
@@ -155,11 +155,11 @@ class Master(Engine):
             np.concatenate([self._sets.members, members]),
         )
 
-    def _odd_sets(self, taken: Floats) -> list[tuple[int, ...]]:
+    def _zero_half_cuts(self, taken: Floats) -> list[tuple[int, ...]]:
         """Return the deepest cuts, not too many of them about the same tasks."""
         depth_of: dict[tuple[int, ...], float] = {}
         for _ in range(TUNING.several):
-            chosen = odd_sets(self._sets, taken, self._draws)
+            chosen = zero_half_cuts(self._sets, taken, self._draws)
             cuts, depth = deepest(
                 self._sets, chosen, taken, TUNING.max_cuts, TUNING.max_cuts // TUNING.several
             )
@@ -182,19 +182,19 @@ class Master(Engine):
             self._idle = [idle for idle in self._idle if idle < TUNING.tries]
 
 
-def _exclusion(precedence: Precedence, place: Ints, kind: np.ndarray) -> Precedence:
+def _exclusion(precedence: Precedence, site: Ints, kind: np.ndarray) -> Precedence:
     """Return an order without the pairs of tasks on one target: those exclude each other too."""
     return precedence._replace(
-        bits=_without_equals(precedence, np.where(kind == COLLECT, place, -1))
+        bits=_without_equals(precedence, np.where(kind == COLLECT, site, -1))
     )
 
 
 @kernel
-def _without_equals(precedence: Precedence, place: Ints) -> Bytes:
+def _without_equals(precedence: Precedence, site: Ints) -> Bytes:
     bits = precedence.bits.copy()
-    for a in range(len(place)):
+    for a in range(len(site)):
         for b in range(precedence.near_from[a], precedence.far_from[a]):
-            if place[a] >= 0 and place[a] == place[b] and comes_before(precedence, a, b):
+            if site[a] >= 0 and site[a] == site[b] and comes_before(precedence, a, b):
                 bit = precedence.offset[a] + b - precedence.near_from[a]
                 bits[bit >> 3] ^= np.uint8(1 << (bit & 7))
     return bits

@@ -47,7 +47,7 @@ def _tight_sets(sets: Sets, taken: Floats, column_of: Ints) -> tuple[Ints, Float
 
 
 @kernel
-def odd_sets(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
+def zero_half_cuts(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
     """Return odd numbers of sets whose cuts a fractional plan breaks.
 
     Sets are added up modulo two so that one fractional task after another, the most taken

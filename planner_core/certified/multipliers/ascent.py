@@ -267,7 +267,7 @@ class Ascent:
 def weigh(
     begin: int,
     end: int,
-    place: Ints,
+    site: Ints,
     worth: Floats,
     standing: Standing,
     weight: Floats,
@@ -275,10 +275,10 @@ def weigh(
 ) -> None:
     """Weigh a part's nodes at the multipliers of the moment, and take its path off the count."""
     for a in range(begin, end):
-        weight[a] = max(0.0, worth[a] - standing.now[place[a]])
+        weight[a] = max(0.0, worth[a] - standing.now[site[a]])
         if is_on_path[a]:
             is_on_path[a] = False
-            standing.taken[place[a]] -= 1
+            standing.taken[site[a]] -= 1
 
 
 @inlined

@@ -39,7 +39,7 @@ class _Part(NamedTuple):
         end_cost = np.zeros(levels.num_levels)
         if shares is not None:
             end_cost = shares.cost_at_end(levels, FROM_START)
-        target = np.where(satellite.kind == COLLECT, satellite.place, len(problem.target_ids))
+        target = np.where(satellite.kind == COLLECT, satellite.site, len(problem.target_ids))
         return cls(
             rows=satellite.rows, network=network, levels=levels, shares=shares, end_cost=end_cost,
             target=target.astype(np.int32),

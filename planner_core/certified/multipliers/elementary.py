@@ -44,7 +44,7 @@ class ElementaryPaths:
 
     def gain(self, multipliers: Floats) -> float:
         """Return what no paths of all parts exceed."""
-        weight = weights(self._worth, multipliers[self._network.place])
+        weight = weights(self._worth, multipliers[self._network.site])
         return float(
             elementary_paths(self._network, self._memory, weight, self._labels, self._count)
         )
@@ -87,12 +87,12 @@ def _run(
                 return number
             part = epochs.orders[number, i]
             begin, end = network.first[part], network.first[part + 1]
-            weigh(begin, end, network.place, worth, standing, weight, is_on_path)
+            weigh(begin, end, network.site, worth, standing, weight, is_on_path)
             _, at = label_part(network, memory, weight, labels, part)
             while at >= 0:
-                if labels.is_paid[at] and worth[at] >= standing.now[network.place[at]]:
+                if labels.is_paid[at] and worth[at] >= standing.now[network.site[at]]:
                     is_on_path[at] = True
-                    standing.taken[network.place[at]] += 1
+                    standing.taken[network.site[at]] += 1
                 at = labels.previous[at]
             move(standing, epochs, number, i)
     return len(epochs.orders)

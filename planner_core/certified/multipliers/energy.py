@@ -32,7 +32,7 @@ class _Part(NamedTuple):
         network = network_of(problem, satellite)
         levels = levels_of_estimate(network, TUNING.levels_per_collect)
         num_targets = len(problem.target_ids)
-        target = np.where(satellite.kind == COLLECT, satellite.place, num_targets)
+        target = np.where(satellite.kind == COLLECT, satellite.site, num_targets)
         return cls(
             rows=satellite.rows, network=network, levels=levels, target=target.astype(np.int32)
         )

@@ -1,4 +1,4 @@
-"""The ascent on prices of contacts, where images are worth less the later they come down.
+"""The ascent on multipliers of contacts, where images are worth less the later they come down.
 
 Contacts are few, an answer takes hundredths of a second, and what the best plans take of contacts
 is what the search for plans wants to know. So every satellite answers in each round, and the
@@ -23,12 +23,12 @@ from planner_core.problem import CONTACT, Bytes, Floats, Problem
 
 
 class LatencyAscent:
-    """Prices of targets and contacts that get better round by round.
+    """Multipliers of targets and contacts that get better round by round.
 
     Parameters
     ----------
     begin
-        The prices of targets at first, unless none at all prove more: where energy is short,
+        The multipliers of targets at first, unless none at all prove more: where energy is short,
         few targets are taken twice. Shape ``(num_targets,)``.
 
     Attributes
@@ -44,21 +44,21 @@ class LatencyAscent:
         self._satellites = latency_relaxations(problem, is_estimate=True)
         self._most = np.append(problem.best_worth, 0.0)
         self._is_contact = problem.opportunities.kind == CONTACT
-        self._prices = np.zeros(len(begin) + 1)
+        self._multipliers = np.zeros(len(begin) + 1)
         # By typical image, as targets are; contacts of the table, others none.
         self._tolls = np.zeros(len(problem.opportunities))
         self._groups = antenna_groups(problem)
         self._antenna = np.zeros(len(self._groups))
         self._images_per_contact = self._images_that_contacts_take()
-        self._best = self._prices, self._tolls, self._antenna
+        self._best = self._multipliers, self._tolls, self._antenna
         self._length, self._num_idle = 1.0, 0
         self.contact_sets: dict[tuple[int, ...], None] = {}
         self.value = float(problem.best_worth.sum())
-        self._proven = Bound(value=self.value, proof="lagrangian", prices=problem.best_worth)
+        self._proven = Bound(value=self.value, proof="lagrangian", multipliers=problem.best_worth)
         self._at_proof = self.value
         given = np.append(begin, 0.0)
-        if self._value(given) < self._value(self._prices):
-            self._prices = given
+        if self._value(given) < self._value(self._multipliers):
+            self._multipliers = given
 
     @property
     def is_settled(self) -> bool:
@@ -73,14 +73,14 @@ class LatencyAscent:
             self._go_round(level, stop)
 
     @property
-    def prices(self) -> Floats:
-        """The best prices of targets. Shape ``(num_targets,)``."""
-        prices, _, _ = self._best
-        return prices[:-1]
+    def multipliers(self) -> Floats:
+        """The best multipliers of targets. Shape ``(num_targets,)``."""
+        multipliers, _, _ = self._best
+        return multipliers[:-1]
 
     @property
-    def contact_prices(self) -> Floats:
-        """The best prices of contacts, by volume. Shape ``(num_contacts,)``."""
+    def contact_multipliers(self) -> Floats:
+        """The best multipliers of contacts, by volume. Shape ``(num_contacts,)``."""
         _, tolls, _ = self._best
         tolls = tolls.copy()
         for one in self._satellites:
@@ -89,8 +89,8 @@ class LatencyAscent:
         return by_volume
 
     @property
-    def antenna_prices(self) -> Floats | None:
-        """The best prices of antennas, None where there are none. Shape ``(num_groups,)``."""
+    def antenna_multipliers(self) -> Floats | None:
+        """The best multipliers of antennas, None where there are none. Shape ``(num_groups,)``."""
         _, _, antenna = self._best
         return antenna if antenna.any() else None
 
@@ -105,24 +105,27 @@ class LatencyAscent:
             self._at_proof = value = self.value
             if self._problem.turns_to_the_sun:
                 value = latency_value(
-                    self._problem, self.prices, self.contact_prices, self.antenna_prices
+                    self._problem,
+                    self.multipliers,
+                    self.contact_multipliers,
+                    self.antenna_multipliers,
                 )
             if value < self._proven.value:
                 self._proven = Bound(
                     value=value,
                     proof="dp",
-                    prices=self.prices,
-                    contact_prices=self.contact_prices,
-                    antenna_prices=self.antenna_prices,
+                    multipliers=self.multipliers,
+                    contact_multipliers=self.contact_multipliers,
+                    antenna_multipliers=self.antenna_multipliers,
                 )
         return self._proven
 
-    def _value(self, prices: Floats) -> float:
-        """Return what prices of targets prove alone."""
-        value = float(prices.sum())
+    def _value(self, multipliers: Floats) -> float:
+        """Return what multipliers of targets prove alone."""
+        value = float(multipliers.sum())
         for one in self._satellites:
             free = np.zeros(len(one.contacts))
-            value += one.most(prices, Tolls(free, free))[0]
+            value += one.most(multipliers, Tolls(free, free))[0]
         return value
 
     def _images_that_contacts_take(self) -> float:
@@ -130,7 +133,7 @@ class LatencyAscent:
         return float(np.mean(np.maximum(np.concatenate([*volumes, np.ones(1)]), 1.0)))
 
     def _go_round(self, level: float, stop: Bytes) -> None:
-        value = float(self._prices.sum()) + paid_for_antennas(self._problem, self._antenna)
+        value = float(self._multipliers.sum()) + paid_for_antennas(self._problem, self._antenna)
         antenna = antenna_tolls(self._problem, self._antenna)
         too_many = np.append(-np.ones(len(self._most) - 1), 0.0)
         too_much = np.zeros(len(self._tolls))
@@ -139,7 +142,7 @@ class LatencyAscent:
             if stop[0]:
                 return
             tolls = Tolls(self._tolls[one.contacts] / one.typical, antenna[one.contacts])
-            gained, path, layer = one.most(self._prices, tolls)
+            gained, path, layer = one.most(self._multipliers, tolls)
             value += gained
             np.add.at(too_many, one.target[path], 1.0)
             too_much[one.contacts] = one.loads(path, layer, tolls) / one.typical
@@ -153,16 +156,16 @@ class LatencyAscent:
             self._move(value - level, too_many, too_much, self._images_per_contact * excess)
 
     def _is_hopeful(self, value: float) -> bool:
-        """Note what the prices of the moment prove; go back to better ones after a while."""
+        """Note what the multipliers of the moment prove; go back to better ones after a while."""
         if value < self.value * (1.0 - SAME):
-            self._best, self._num_idle = (self._prices, self._tolls, self._antenna), 0
+            self._best, self._num_idle = (self._multipliers, self._tolls, self._antenna), 0
             self.value = value
             return True
         self._num_idle += 1
         if self._num_idle < TUNING.patience:
             return True
         self._length, self._num_idle = TUNING.shorter * self._length, 0
-        self._prices, self._tolls, self._antenna = self._best
+        self._multipliers, self._tolls, self._antenna = self._best
         return False
 
     def _move(self, above: float, too_many: Floats, too_much: Floats, excess: Floats) -> None:
@@ -173,12 +176,12 @@ class LatencyAscent:
         excess
             Of each group of contacts, in images that they can bring down. Shape ``(num_groups,)``.
         """
-        too_many = np.where((self._prices <= 0.0) & (too_many < 0.0), 0.0, too_many)
+        too_many = np.where((self._multipliers <= 0.0) & (too_many < 0.0), 0.0, too_many)
         too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
         excess = np.where((self._antenna <= 0.0) & (excess < 0.0), 0.0, excess)
         squares = sum(float(np.square(each).sum()) for each in (too_many, too_much, excess))
         above = min(above, TUNING.far_above * self.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
-        self._prices = np.clip(self._prices + step * too_many, 0.0, self._most)
+        self._multipliers = np.clip(self._multipliers + step * too_many, 0.0, self._most)
         self._tolls = np.maximum(self._tolls + step * too_much, 0.0)
         self._antenna = np.maximum(self._antenna + step * self._images_per_contact * excess, 0.0)

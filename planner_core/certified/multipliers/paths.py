@@ -34,7 +34,7 @@ class Paths:
 
     def gain(self, multipliers: Floats) -> float:
         """Return what the longest paths of all parts are worth."""
-        np.take(multipliers, self._network.place, out=self._weight)
+        np.take(multipliers, self._network.site, out=self._weight)
         np.maximum(self._worth - self._weight, 0.0, out=self._weight)
         return float(
             heaviest_paths(self._network, self._weight, self._value, self._previous, self._ends)
@@ -75,13 +75,13 @@ def _run(
                 return number
             part = epochs.orders[number, i]
             begin, end = network.first[part], network.first[part + 1]
-            weigh(begin, end, network.place, worth, standing, weight, is_on_path)
+            weigh(begin, end, network.site, worth, standing, weight, is_on_path)
             _, at = heaviest_path(network, part, weight, value, previous)
             while at >= 0:
                 # What is worth nothing is only passed through.
                 if weight[at] > 0.0:
                     is_on_path[at] = True
-                    standing.taken[network.place[at]] += 1
+                    standing.taken[network.site[at]] += 1
                 at = previous[at]
             move(standing, epochs, number, i)
     return len(epochs.orders)

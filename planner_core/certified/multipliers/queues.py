@@ -45,7 +45,7 @@ class _Part(NamedTuple):
         if queues is None:
             return None
         is_image = satellite.kind[rows] == COLLECT
-        target = np.where(is_image, satellite.place[rows], num_targets)
+        target = np.where(is_image, satellite.site[rows], num_targets)
         return cls(queues=queues, target=target.astype(np.int32))
 
 
@@ -58,10 +58,10 @@ class QueuePaths(BestPaths[_Part]):
 
     def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
         """Return the most that a satellite can gain, and the tasks of a path that does."""
-        return most_by_queues(part.queues._replace(price=multipliers[part.target]), self._stop)
+        return most_by_queues(part.queues._replace(multiplier=multipliers[part.target]), self._stop)
 
 
-def priced_by_queues(
+def multipliers_by_queues(
     problem: Problem, contacts: Sequence[int], begin: Floats, num_epochs: int, stop: Bytes
 ) -> Floats:
     """Return multipliers of targets that suit plans with these contacts.

@@ -1,4 +1,4 @@
-"""Prices for the bound by dynamic programmes, from subgradient steps over the exact programme."""
+"""Multipliers for the bound by dynamic programmes: a subgradient ascent on the exact one."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from planner_core.problem import (
 from planner_core.problem.plan import Plan
 
 
-class PriceSearch:
-    """Prices that bring the bound down, and what the relaxed plans on the way looked like.
+class ResourceAscent:
+    """Multipliers that bring the bound down, and what the relaxed plans on the way looked like.
 
     Attributes
     ----------
     satellites
         The programme of each satellite that has anything to do.
-    value, prices, antenna_prices, unit
+    value, multipliers, antenna_multipliers, unit
         The best bound and what proves it.
     usage
         How many relaxed plans took each opportunity. Shape ``(n,)``.
@@ -45,7 +45,7 @@ class PriceSearch:
         Whether a relaxed plan has taken more contacts at a time than a station can serve.
     """
 
-    def __init__(self, problem: Problem, value: float, prices: Floats, stop: Bytes) -> None:
+    def __init__(self, problem: Problem, value: float, multipliers: Floats, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
         self._typical = problem.typical_worth
         # By target: what the image earns that plans take of it, as far as they are known.
@@ -59,35 +59,37 @@ class PriceSearch:
         is_alone = self._num_satellites == 1
         comes_down = is_alone and problem.counts_delivery
         self.satellites = self._relaxations(TUNING.several if comes_down else TUNING.coarse)
-        # Multipliers are the prices of targets, then those of groups of contacts.
+        # Multipliers are the multipliers of targets, then those of groups of contacts.
         self._groups = antenna_groups(problem)
         num_groups = len(self._groups)
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
         self._is_moved = np.append(self._is_reachable, np.zeros(num_groups, dtype=np.bool_))
-        # No contact brings more down than all targets are worth: a price above that says no more.
+        # No contact brings more down than all targets are worth: a multiplier above that says no
+        # more.
         all_worth = float(problem.best_worth.sum())
         self._most = np.append(problem.best_worth, np.full(num_groups, all_worth))
         own_scale = np.where(problem.best_worth > 0.0, problem.best_worth, 1.0)
         self._scale = np.append(own_scale, self._scale_of_antennas())
-        self.antenna_prices = np.zeros(num_groups)
+        self.antenna_multipliers = np.zeros(num_groups)
         self.value, self.theta, self._stalled = np.inf, 1.0, 0
         self._now = self._direction = np.zeros_like(self._scale)
-        # Rows of relaxed plans of each satellite: at any prices the best is no worse than they.
+        # Rows of relaxed plans of each satellite: at any multipliers the best is no worse than
+        # they.
         self._paths: list[list[Ints]] = [[] for _ in self.satellites]
         self.unit = self._unit(value)
         self.usage = np.zeros(len(problem.opportunities))
         self.contact_sets: Counter[tuple[int, ...]] = Counter()
         self.wants_antennas = False
-        self.restart(prices)
+        self.restart(multipliers)
 
     def _relaxations(self, levels_per_collect: int) -> tuple[SatelliteRelaxation, ...]:
         every = relaxations(self._problem, levels_per_collect)
-        return tuple(one.with_data_price(self._num_images) for one in every)
+        return tuple(one.with_data_multiplier(self._num_images) for one in every)
 
     def _scale_of_antennas(self) -> Floats:
-        """Return how far prices of antennas go where those of typical targets go their worth.
+        """Return how far multipliers of antennas go where those of typical targets go their worth.
 
-        A contact brings down many images, and how many is what its price comes to. Of four
+        A contact brings down many images, and how many is what its multiplier comes to. Of four
         satellites and two stations 887 images come to 865 in 40 steps so, to 877 where each group
         goes by its own contacts, and to 870 where groups go a twentieth as far. Shape
         ``(num_groups,)``.
@@ -109,22 +111,26 @@ class PriceSearch:
         return float(unit)
 
     def step(self, level: float) -> bool:
-        """Evaluate the current prices and step on; return False once the work must stop.
+        """Evaluate the current multipliers and step on; return False once the work must stop.
 
         Parameters
         ----------
         level
-            Where the best prices are expected.
+            Where the best multipliers are expected.
         """
         now = self._now
-        prices, antenna_prices = self._whole(now, self.unit)
-        outcome = self._evaluate(prices, antenna_prices)
+        multipliers, antenna_multipliers = self._whole(now, self.unit)
+        outcome = self._evaluate(multipliers, antenna_multipliers)
         if outcome is None:
             return False
         value, too_many = outcome
         self._stalled += 1
         if value < self.value - 1e-9:
-            self.value, self.prices, self.antenna_prices = value, prices, antenna_prices
+            self.value, self.multipliers, self.antenna_multipliers = (
+                value,
+                multipliers,
+                antenna_multipliers,
+            )
             self._stalled = 0
         if self._stalled >= TUNING.patience:
             self.theta, self._stalled = self.theta * TUNING.shorter, 0
@@ -146,19 +152,21 @@ class PriceSearch:
         return Bound(
             value=self.value,
             proof="dp",
-            prices=self.prices,
-            antenna_prices=self.antenna_prices if self.antenna_prices.any() else None,
+            multipliers=self.multipliers,
+            antenna_multipliers=self.antenna_multipliers
+            if self.antenna_multipliers.any()
+            else None,
             unit=self.unit,
         )
 
     def count_in(self, unit: float, *, moves_antennas: bool) -> None:
-        """Go on in other units of worth, and let prices of antennas move or leave them as they are.
+        """Continue in other units of worth; let the multipliers of antennas move, or hold them.
 
-        Where they move targets hardly do: antennas weigh as much as all that contacts bring down.
+        If they move, those of targets hardly do: an antenna weighs as much as all its downlinks.
         """
         self.unit = unit
         self._is_moved[len(self._is_reachable) :] = moves_antennas
-        self.restart(self.prices)
+        self.restart(self.multipliers)
 
     def count_finely(self, plan: Plan) -> None:
         """Go on with more levels of the recorder, from a plan that is known."""
@@ -189,32 +197,32 @@ class PriceSearch:
             paths.append(np.flatnonzero(taken[relaxation.satellite.rows]).astype(np.int32))
         self._note_images(np.flatnonzero(taken))
 
-    def restart(self, prices: Floats, antenna_prices: Floats | None = None) -> None:
-        """Go on from other prices of targets, and of antennas, in shorter steps.
+    def restart(self, multipliers: Floats, antenna_multipliers: Floats | None = None) -> None:
+        """Go on from other multipliers of targets, and of antennas, in shorter steps.
 
-        Prices of antennas are the best so far by default.
+        Multipliers of antennas are the best so far by default.
         """
-        if antenna_prices is not None:
-            self.antenna_prices = antenna_prices
-        self.value, self.prices = np.inf, np.where(self._is_reachable, prices, 0.0)
+        if antenna_multipliers is not None:
+            self.antenna_multipliers = antenna_multipliers
+        self.value, self.multipliers = np.inf, np.where(self._is_reachable, multipliers, 0.0)
         self.theta, self._stalled = 1.0, 0
         self._return_to_the_best()
 
     def _return_to_the_best(self) -> None:
-        self._now = np.append(self.prices, self.antenna_prices)
+        self._now = np.append(self.multipliers, self.antenna_multipliers)
         self._direction = np.zeros_like(self._now)
 
     def _whole(self, multipliers: Floats, unit: float) -> tuple[Floats, Floats]:
-        """Return prices at which the images that plans take are worth whole units; antennas too."""
-        prices, antenna_prices = np.split(multipliers, [len(self._is_reachable)])
-        whole = leaving_whole_units(self._problem, prices, unit, self._worth_taken)
+        """Return multipliers, antennas' too, at which the images taken are worth whole units."""
+        multipliers, antenna_multipliers = np.split(multipliers, [len(self._is_reachable)])
+        whole = leaving_whole_units(self._problem, multipliers, unit, self._worth_taken)
         whole[~self._is_reachable] = 0.0
-        return whole, unit * np.round(antenna_prices / unit)
+        return whole, unit * np.round(antenna_multipliers / unit)
 
     def _note_images(self, rows: npt.NDArray[np.integer]) -> None:
         """Note what the images among these opportunities earn, as what plans take."""
         images = rows[self._problem.opportunities.kind[rows] == COLLECT]
-        self._worth_taken[self._problem.opportunities.place[images]] = self._problem.worth[images]
+        self._worth_taken[self._problem.opportunities.site[images]] = self._problem.worth[images]
 
     def _known(self, i: int, worth: Ints) -> int | None:
         """Return what a satellite gains on one of the paths that are known, if there are any."""
@@ -222,13 +230,15 @@ class PriceSearch:
         gains = (max(0, int(weight[path].sum())) for path in self._paths[i])
         return max(gains, default=None)
 
-    def _evaluate(self, prices: Floats, antenna_prices: Floats) -> tuple[float, Floats] | None:
-        """Return the bound of these prices, and what its paths take too often.
+    def _evaluate(
+        self, multipliers: Floats, antenna_multipliers: Floats
+    ) -> tuple[float, Floats] | None:
+        """Return the bound of these multipliers, and what its paths take too often.
 
         Shape ``(num_targets + num_groups,)``.
         """
         problem = self._problem
-        worth = whole_worth(problem, prices, self.unit, antenna_prices)
+        worth = whole_worth(problem, multipliers, self.unit, antenna_multipliers)
         taken = np.zeros(len(worth))
         units = 0
         for i, relaxation in enumerate(self.satellites):
@@ -250,10 +260,10 @@ class PriceSearch:
         contacts = np.flatnonzero((taken > 0.0) & (table.kind == CONTACT))
         self.contact_sets[tuple(contacts.tolist())] += 1
         images = np.flatnonzero((taken > 0.0) & (table.kind == COLLECT))
-        images = images[problem.worth[images] >= prices[table.place[images]]]
-        counts = np.bincount(table.place[images], minlength=len(prices))
+        images = images[problem.worth[images] >= multipliers[table.site[images]]]
+        counts = np.bincount(table.site[images], minlength=len(multipliers))
         excess = np.array([taken[group.rows].sum() - group.limit for group in self._groups])
         self.wants_antennas |= bool(np.any(excess > 0.0))
-        paid = float(prices.sum()) + paid_for_antennas(problem, antenna_prices)
+        paid = float(multipliers.sum()) + paid_for_antennas(problem, antenna_multipliers)
         rounded_away = 1e-9 * len(worth) * self.unit
         return paid + units * self.unit + rounded_away, np.append(counts - 1.0, excess)

@@ -20,18 +20,18 @@ class Bound:
 
     Attributes
     ----------
-    prices
+    multipliers
         What proves a Lagrangian bound (``lagrangian_value`` checks them) or one by dynamic
         programmes (``resource_bound.resource_value``), one per target; None for other proofs.
         Shape ``(num_targets,)``.
     is_elementary
-        Whether it is ``elementary_value`` that checks the prices.
-    contact_prices
-        What proves a bound with a half-life, with ``prices`` (``latency.latency_value``), one for
-        each contact; all 0 where batteries alone prove one without. Shape ``(num_contacts,)``.
-    antenna_prices
-        What proves a bound by dynamic programmes, with ``prices``, where satellites want the same
-        antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.
+        Whether it is ``elementary_value`` that checks the multipliers.
+    contact_multipliers
+        What proves a bound with a half-life, with ``multipliers`` (``latency.latency_value``), one
+        for each contact; all 0 where batteries alone prove one without. Shape ``(num_contacts,)``.
+    antenna_multipliers
+        What proves a bound by dynamic programmes, with ``multipliers``, where satellites want the
+        same antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.
     queue_levels
         Of energy in a collect, where exact programmes of queues prove a bound with a half-life
         (``queues.queue_value``).
@@ -50,9 +50,9 @@ class Bound:
 
     value: float
     proof: Proof
-    prices: Floats | None = None
-    contact_prices: Floats | None = None
-    antenna_prices: Floats | None = None
+    multipliers: Floats | None = None
+    contact_multipliers: Floats | None = None
+    antenna_multipliers: Floats | None = None
     queue_levels: int | None = None
     exact_contacts: tuple[int, ...] = ()
     is_elementary: bool = False
@@ -103,7 +103,7 @@ def is_optimal(reward: float, bound: float, unit: float) -> bool:
 
 
 def accessible(problem: Problem) -> Bound:
-    """Return the bound that every accessible target is imaged: prices of its best worth."""
-    prices = problem.best_worth
-    value = rounded_bound(problem, float(prices.sum()), 0.0)
-    return Bound(value=value, proof="lagrangian", prices=prices)
+    """Return the bound that every accessible target is imaged: multipliers of its best worth."""
+    multipliers = problem.best_worth
+    value = rounded_bound(problem, float(multipliers.sum()), 0.0)
+    return Bound(value=value, proof="lagrangian", multipliers=multipliers)

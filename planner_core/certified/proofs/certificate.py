@@ -63,19 +63,19 @@ class Cut:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Multipliers:
-    """Prices of targets and of cuts, none of them negative.
+    """Multipliers of targets and of cuts, none of them negative.
 
     Attributes
     ----------
-    prices
+    of_targets
         Shape ``(num_targets,)``.
-    cut_prices
+    of_cuts
         One for each of ``cuts``.
     """
 
-    prices: Floats
+    of_targets: Floats
     cuts: tuple[Cut, ...] = ()
-    cut_prices: tuple[float, ...] = ()
+    of_cuts: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,7 +119,9 @@ class _Checked:
 
     def is_refuted(self, refutation: Refutation, left: Ints) -> bool:
         for step in refutation.steps:
-            if np.any(step.prices < 0.0) or any(price < 0.0 for price in step.cut_prices):
+            if np.any(step.of_targets < 0.0) or any(
+                multiplier < 0.0 for multiplier in step.of_cuts
+            ):
                 return False
             if not all(self._is_sound(cut) for cut in step.cuts):
                 return False
@@ -146,7 +148,7 @@ class _Checked:
         table, local = self._problem.opportunities, self._problem.local_row
         if table.kind[a] != COLLECT or table.kind[b] != COLLECT:
             return False
-        if table.place[a] == table.place[b]:
+        if table.site[a] == table.site[b]:
             return True
         satellite = int(table.satellite[a])
         if table.satellite[b] != satellite:
@@ -190,16 +192,16 @@ def is_below(value: Floats | float, amount: float) -> Bools:
 
 
 def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Floats]:
-    """Return the constant of the bound, and what each opportunity is worth at the prices."""
+    """Return the constant of the bound, and what each opportunity is worth at the multipliers."""
     table = problem.opportunities
     is_collect = table.kind == COLLECT
     worth = problem.worth.copy()
-    worth[is_collect] -= step.prices[table.place[is_collect]]
+    worth[is_collect] -= step.of_targets[table.site[is_collect]]
     constant = 0.0
-    for cut, price in zip(step.cuts, step.cut_prices, strict=True):
+    for cut, multiplier in zip(step.cuts, step.of_cuts, strict=True):
         members, weights = cut.weights()
-        worth[members] -= price * weights
-        constant += price * cut.limit
-    offered = table.place[rows][table.kind[rows] == COLLECT]
-    constant += float(step.prices[np.unique(offered)].sum())
+        worth[members] -= multiplier * weights
+        constant += multiplier * cut.limit
+    offered = table.site[rows][table.kind[rows] == COLLECT]
+    constant += float(step.of_targets[np.unique(offered)].sum())
     return constant, np.maximum(worth, 0.0)[rows]

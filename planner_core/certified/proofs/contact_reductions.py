@@ -1,7 +1,7 @@
-"""What prices of contacts say of plans worth more than some level: which contacts may follow.
+"""What multipliers of contacts say of plans worth more than some level: which contacts may follow.
 
-From a forward and a backward pass with prices (``LatencyRelaxation.most_by_pairs``) each pair of
-contacts that directly follow each other has a bound. Pairs below the level are in no such plan.
+From a forward and a backward pass with multipliers (``LatencyRelaxation.most_by_pairs``) each pair
+of contacts that directly follow each other has a bound. Pairs below the level are in no such plan.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner_core.certified.dp.queue_tables import Fixing
-from planner_core.certified.proofs.latency import LatencyPrices, latency_relaxations
+from planner_core.certified.proofs.latency import LatencyMultipliers, latency_relaxations
 from planner_core.problem import Bools, Bytes, Floats, Ints, Problem
 
 
@@ -35,14 +35,14 @@ class Reduction:
 
 def reductions(
     problem: Problem,
-    prices: Floats,
-    contact_prices: Floats,
+    multipliers: Floats,
+    contact_multipliers: Floats,
     level: float,
     per_collect: int,
     exact: Bools,
     stop: Bytes,
 ) -> dict[int, Reduction]:
-    """Return what prices say of plans worth more than ``level``, by satellite.
+    """Return what multipliers say of plans worth more than ``level``, by satellite.
 
     Empty once ``stop`` is set; without satellites whose contacts share layers.
 
@@ -53,7 +53,7 @@ def reductions(
     exact
         Opportunities whose energy both do not round. Shape ``(n,)``.
     """
-    given = LatencyPrices.of(problem, prices, contact_prices, None)
+    given = LatencyMultipliers.of(problem, multipliers, contact_multipliers, None)
     most: dict[int, tuple[Floats, Fixing]] = {}
     total = given.paid
     indices = [index for index, one in enumerate(problem.satellites) if len(one)]

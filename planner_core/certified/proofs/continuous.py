@@ -1,10 +1,10 @@
 r"""A bound on plans with continuous starts.
 
-Weak duality as in ``planner_core.certified.proofs.lagrangian``: prices of targets, and for each
-satellite the heaviest chain of its tasks, here with starts anywhere in the accesses and no access
-twice. ``planner_core.certified.dp.start_labels`` says why its labels never fall below the heaviest
-chain. It needs satellites that turn faster than lines of sight do: then the earliest start is the
-best one, and chains are sequences of accesses.
+Weak duality as in ``planner_core.certified.proofs.lagrangian``: multipliers of targets, and for
+each satellite the heaviest chain of its tasks, here with starts anywhere in the accesses and no
+access twice. ``planner_core.certified.dp.start_labels`` says why its labels never fall below the
+heaviest chain. It needs satellites that turn faster than lines of sight do: then the earliest start
+is the best one, and chains are sequences of accesses.
 
 Battery, recorder, stations and antennas are left out, which can only raise the bound.
 """
@@ -23,7 +23,7 @@ from planner_core.certified.proofs.totals import totals_bound
 from planner_core.certified.sizes import LABELS_PER_CELL, MAX_PAIRS
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.time_windows import (
-    Spans,
+    TimeWindows,
     part_of,
     spans_of,
     view_of,
@@ -44,14 +44,14 @@ def quick_bound(problem: Problem) -> Bound:
     return every if totals is None or every.value <= totals.value else totals
 
 
-def continuous_value(problem: Problem, prices: Floats) -> float:
-    """Return the bound that ``prices`` prove. This is the whole proof: it needs no search."""
-    if np.any(prices < problem.best_worth):
+def continuous_value(problem: Problem, multipliers: Floats) -> float:
+    """Return the bound that ``multipliers`` prove. This is the whole proof: it needs no search."""
+    if np.any(multipliers < problem.best_worth):
         dual = ContinuousDual.of(problem, width_for(problem))
         if dual is not None:
-            value, _ = dual.at(prices)
+            value, _ = dual.at(multipliers)
             return value
-    # Prices of the best worth leave nothing to earn on any chain.
+    # Multipliers of the best worth leave nothing to earn on any chain.
     return float(problem.best_worth.sum())
 
 
@@ -80,7 +80,7 @@ def num_followers(problem: Problem, width_s: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContinuousDual:
-    """The function of prices whose every value is a bound.
+    """The function of multipliers whose every value is a bound.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class ContinuousDual:
         is_offered = np.zeros(len(problem.target_ids), dtype=np.bool_)
         for index in range(len(problem.satellites)):
             spans = spans_of(problem, index)
-            is_offered[spans.place] = True
+            is_offered[spans.site] = True
             for piece in pieces_of(spans):
                 if stop is not None and stop[0]:
                     return None
@@ -117,44 +117,44 @@ class ContinuousDual:
                 parts.append((cells, labels_of(cells, LABELS_PER_CELL)))
         return cls(problem=problem, parts=tuple(parts), is_offered=is_offered)
 
-    def clipped(self, prices: Floats) -> Floats:
-        """Return prices as they count."""
-        return np.where(self.is_offered, surplus(prices, self.problem.best_worth), 0.0)
+    def clipped(self, multipliers: Floats) -> Floats:
+        """Return multipliers as they count."""
+        return np.where(self.is_offered, surplus(multipliers, self.problem.best_worth), 0.0)
 
-    def at(self, prices: Floats, *, is_exact: bool = True) -> tuple[float, Ints]:
-        """Return the value at prices, and how often the chains there take each target.
+    def at(self, multipliers: Floats, *, is_exact: bool = True) -> tuple[float, Ints]:
+        """Return the value at multipliers, and how often the chains there take each target.
 
         Only the exact value is a bound.
         """
-        price = self.clipped(prices)
-        total = float(price.sum())
-        counts = np.zeros(len(price), dtype=np.int32)
+        multiplier = self.clipped(multipliers)
+        total = float(multiplier.sum())
+        counts = np.zeros(len(multiplier), dtype=np.int32)
         for number in range(len(self.parts)):
-            value, taken = self.chain(number, price, is_exact=is_exact)
+            value, taken = self.chain(number, multiplier, is_exact=is_exact)
             total += value
             np.add.at(counts, taken, 1)
         return total, counts
 
-    def chain(self, number: int, price: Floats, *, is_exact: bool) -> tuple[float, Ints]:
+    def chain(self, number: int, multiplier: Floats, *, is_exact: bool) -> tuple[float, Ints]:
         """Return the heaviest chain of one part: its worth, and the targets that it is paid for."""
         cells, labels = self.parts[number]
         worth = self.problem.worth[cells.spans.row]
-        weight = weights(worth, price[cells.spans.place])
+        weight = weights(worth, multiplier[cells.spans.site])
         value, slot = heaviest(cells, weight, labels, LABELS_PER_CELL, is_exact)
         taken = []
         while slot >= 0:
             task = cells.task[slot // LABELS_PER_CELL]
-            if labels.is_paid[slot] and worth[task] >= price[cells.spans.place[task]]:
-                taken.append(cells.spans.place[task])
+            if labels.is_paid[slot] and worth[task] >= multiplier[cells.spans.site[task]]:
+                taken.append(cells.spans.site[task])
             slot = int(labels.parent[slot])
         return value, np.array(taken, dtype=np.int32)
 
 
-def pieces_of(spans: Spans) -> list[Spans]:
+def pieces_of(spans: TimeWindows) -> list[TimeWindows]:
     """Return tasks in pieces of a day: cut where nothing is open, or little in a long while."""
     ends_s = np.maximum.accumulate(spans.close_s + spans.length_s)
     is_clear = spans.open_s[1:] >= ends_s[:-1] + TUNING.tidy_s
-    pieces: list[Spans] = []
+    pieces: list[TimeWindows] = []
     left = [
         part_of(spans, slice(a, b))
         for a, b in itertools.pairwise([0, *(np.flatnonzero(is_clear) + 1), len(spans.row)])

@@ -37,12 +37,12 @@ VERSION: Final = 1
 def to_json(bound: Bound) -> str:
     """Return a bound and what proves it as JSON text, exact to the last bit."""
     document: dict[str, Any] = {"version": VERSION, "proof": bound.proof, "value": bound.value}
-    if bound.prices is not None:
-        document["prices"] = bound.prices.tolist()
-    if bound.contact_prices is not None:
-        document["contact_prices"] = bound.contact_prices.tolist()
-    if bound.antenna_prices is not None:
-        document["antenna_prices"] = bound.antenna_prices.tolist()
+    if bound.multipliers is not None:
+        document["prices"] = bound.multipliers.tolist()
+    if bound.contact_multipliers is not None:
+        document["contact_prices"] = bound.contact_multipliers.tolist()
+    if bound.antenna_multipliers is not None:
+        document["antenna_prices"] = bound.antenna_multipliers.tolist()
     if bound.queue_levels is not None:
         document["queue_levels"] = bound.queue_levels
         document["exact_contacts"] = list(bound.exact_contacts)
@@ -64,16 +64,16 @@ def from_json(text: str) -> Bound:
     """Return the bound of ``to_json``."""
     document = json.loads(text)
 
-    def prices(key: str) -> Floats | None:
+    def multipliers(key: str) -> Floats | None:
         values = document.get(key)
         return None if values is None else np.array(values, dtype=np.float64)
 
     return Bound(
         value=float(document["value"]),
         proof=cast(Proof, document["proof"]),
-        prices=prices("prices"),
-        contact_prices=prices("contact_prices"),
-        antenna_prices=prices("antenna_prices"),
+        multipliers=multipliers("prices"),
+        contact_multipliers=multipliers("contact_prices"),
+        antenna_multipliers=multipliers("antenna_prices"),
         queue_levels=document.get("queue_levels"),
         exact_contacts=tuple(document.get("exact_contacts", ())),
         is_elementary=bool(document.get("elementary", False)),
@@ -108,27 +108,29 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     if bound.proof == "totals":
         totals = totals_bound(problem)
         return totals is not None and totals.value <= bound.value + room
-    if bound.prices is None:
+    if bound.multipliers is None:
         return None
     if problem.continuous_starts:
-        value = continuous_value(problem, bound.prices)
+        value = continuous_value(problem, bound.multipliers)
     elif bound.queue_levels is not None:
         value, _ = queue_value(
             problem,
-            bound.prices,
+            bound.multipliers,
             bound.queue_levels,
-            contact_prices=bound.contact_prices,
+            contact_multipliers=bound.contact_multipliers,
             exact_contacts=bound.exact_contacts,
             level=bound.value,
         )
-    elif bound.contact_prices is not None:
-        value = latency_value(problem, bound.prices, bound.contact_prices, bound.antenna_prices)
+    elif bound.contact_multipliers is not None:
+        value = latency_value(
+            problem, bound.multipliers, bound.contact_multipliers, bound.antenna_multipliers
+        )
     elif bound.unit is not None:
-        value = resource_value(problem, bound.prices, bound.unit, bound.antenna_prices)
+        value = resource_value(problem, bound.multipliers, bound.unit, bound.antenna_multipliers)
     elif bound.is_elementary:
-        value, _ = elementary_value(problem, bound.prices)
+        value, _ = elementary_value(problem, bound.multipliers)
     else:
-        value, _ = lagrangian_value(problem, bound.prices)
+        value, _ = lagrangian_value(problem, bound.multipliers)
     return rounded_bound(problem, value, 0.0) <= bound.value + room
 
 
@@ -136,9 +138,9 @@ def _refutation_to_json(refutation: Refutation) -> dict[str, Any]:
     document: dict[str, Any] = {
         "steps": [
             {
-                "prices": step.prices.tolist(),
+                "prices": step.of_targets.tolist(),
                 "cuts": [[group.tolist() for group in cut.sets] for cut in step.cuts],
-                "cut_prices": list(step.cut_prices),
+                "cut_prices": list(step.of_cuts),
             }
             for step in refutation.steps
         ]
@@ -157,12 +159,12 @@ def _refutation_from_json(document: dict[str, Any]) -> Refutation:
     return Refutation(
         steps=tuple(
             Multipliers(
-                prices=np.array(step["prices"], dtype=np.float64),
+                of_targets=np.array(step["prices"], dtype=np.float64),
                 cuts=tuple(
                     Cut(sets=tuple(np.array(group, dtype=np.int32) for group in cut))
                     for cut in step["cuts"]
                 ),
-                cut_prices=tuple(step["cut_prices"]),
+                of_cuts=tuple(step["cut_prices"]),
             )
             for step in document["steps"]
         ),

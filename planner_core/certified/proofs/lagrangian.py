@@ -1,10 +1,10 @@
 r"""An upper bound on what any plan of a problem can earn.
 
-Weak duality: give each target a price :math:`\lambda_i`, from 0 to the best worth of its collects.
-Then no plan earns more than :math:`\sum_i \lambda_i` plus, for each satellite, the heaviest path
-of tasks in which collect k of :math:`i` is worth :math:`\max(0, v_k - \lambda_i)` (and may be
-followed by others of :math:`i`).
-Battery, recorder and stations are left out, which can only raise the bound. Prices come from
+Weak duality: give each target a multiplier :math:`\lambda_i`, from 0 to the best worth of its
+collects. Then no plan earns more than :math:`\sum_i \lambda_i` plus, for each satellite, the
+heaviest path of tasks in which collect k of :math:`i` is worth :math:`\max(0, v_k - \lambda_i)`
+(and may be followed by others of :math:`i`).
+Battery, recorder and stations are left out, which can only raise the bound. Multipliers come from
 an ascent; whatever they are, the bound holds.
 """
 
@@ -23,26 +23,26 @@ from planner_core.problem import Floats, Ints, Problem
 from planner_core.worth import surplus, weights
 
 
-def lagrangian_value(problem: Problem, prices: Floats) -> tuple[float, Ints]:
-    """Return the bound that ``prices`` prove, and how often its paths take each target.
+def lagrangian_value(problem: Problem, multipliers: Floats) -> tuple[float, Ints]:
+    """Return the bound that ``multipliers`` prove, and how often its paths take each target.
 
     This is the whole proof: it needs no search, only the problem.
     """
     network = network_of(problem)
     num_targets = len(problem.target_ids)
-    price = np.append(surplus(prices, problem.best_worth), 0.0)
+    multiplier = np.append(surplus(multipliers, problem.best_worth), 0.0)
     n = len(network.row)
     previous = np.empty(n, dtype=np.int32)
     ends = np.empty(len(network.first) - 1, dtype=np.int32)
     worth = problem.worth[network.row]
-    weight = weights(worth, price[network.place])
-    total = price.sum() + heaviest_paths(network, weight, np.empty(n), previous, ends)
+    weight = weights(worth, multiplier[network.site])
+    total = multiplier.sum() + heaviest_paths(network, weight, np.empty(n), previous, ends)
     counts = np.zeros(num_targets + 1, dtype=np.int32)
     for end in ends:
         at = int(end)
         while at >= 0:
-            if worth[at] >= price[network.place[at]]:
-                counts[network.place[at]] += 1
+            if worth[at] >= multiplier[network.site[at]]:
+                counts[network.site[at]] += 1
             at = int(previous[at])
     return float(total), counts[:-1]
 
@@ -52,7 +52,7 @@ _latest: WeakKeyDictionary[Problem, tuple[tuple[float, int], Bound]] = WeakKeyDi
 
 
 def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = None) -> Bound:
-    """Return a bound, tightened by an ascent on the prices until it is down to ``reward``.
+    """Return a bound, tightened by an ascent on the multipliers until it is down to ``reward``.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = N
     bound = Bound(
         value=rounded_bound(problem, ascent.value, reward),
         proof="lagrangian",
-        prices=ascent.multipliers,
+        multipliers=ascent.multipliers,
         is_elementary=is_elementary,
     )
     _latest[problem] = asked, bound

@@ -1,9 +1,9 @@
-r"""An upper bound where images are worth less the later they come down: prices of contacts.
+r"""An upper bound where images are worth less the later they come down: multipliers of contacts.
 
-Each target has a price :math:`\lambda_i`, and each contact :math:`c` one for what it takes down by
-volume, :math:`\mu_c`. The bits of an image come down in contacts after it that the plan takes, and
-none before the contact is ready. So an image that takes :math:`s_k` of the recorder is worth no
-more than what it is worth on board and the best of its contacts adds,
+Each target has a multiplier :math:`\lambda_i`, and each contact :math:`c` one for what it takes
+down by volume, :math:`\mu_c`. The bits of an image come down in contacts after it that the plan
+takes, and none before the contact is ready. So an image that takes :math:`s_k` of the recorder is
+worth no more than what it is worth on board and the best of its contacts adds,
 
 .. math::
 
@@ -79,7 +79,7 @@ class _Terms(NamedTuple):
 
 
 class Tolls(NamedTuple):
-    """Prices of some contacts; shape ``(num_contacts,)``.
+    """Multipliers of some contacts; shape ``(num_contacts,)``.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class LatencyRelaxation:
         own = satellite.resources
         size = np.where(is_image, satellite.end_s - satellite.start_s, 0.0) * own.collect_fill_per_s
         on_board = problem.objective.collected_share * problem.worth_on_ground[rows]
-        setup_s = problem.downlinks.stations.setup_s[satellite.place[layers.contact]]
+        setup_s = problem.downlinks.stations.setup_s[satellite.site[layers.contact]]
         if is_estimate:
             levels = levels_of_estimate(network, per_collect)
         else:
@@ -151,7 +151,7 @@ class LatencyRelaxation:
         is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
         return cls(
             rows=rows,
-            target=np.where(is_image, satellite.place, len(problem.target_ids)).astype(np.int32),
+            target=np.where(is_image, satellite.site, len(problem.target_ids)).astype(np.int32),
             contacts=rows[layers.contact],
             typical=(float(np.median(size[is_image])) if is_image.any() else 0.0) or 1.0,
             may_need_all=not (is_dear and is_transitive_on(satellite)),
@@ -170,21 +170,21 @@ class LatencyRelaxation:
             ),
         )
 
-    def most(self, prices: Floats, tolls: Tolls) -> tuple[float, Ints, Ints]:
+    def most(self, multipliers: Floats, tolls: Tolls) -> tuple[float, Ints, Ints]:
         """Return the most that the satellite can gain, the rows of a path that does, and layers.
 
         Parameters
         ----------
-        prices
+        multipliers
             Of targets, and none for contacts. Shape ``(num_targets + 1,)``.
         tolls
             Of its contacts.
         """
-        m, weight = len(self.rows), self._weight(prices, tolls)
+        m, weight = len(self.rows), self._weight(multipliers, tolls)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
 
-    def most_by_pairs(self, prices: Floats, tolls: Tolls) -> tuple[Floats, Fixing] | None:
+    def most_by_pairs(self, multipliers: Floats, tolls: Tolls) -> tuple[Floats, Fixing] | None:
         """Return the most that it can gain by each pair of contacts that follow each other.
 
         As ``contact_pairs.most_by_pairs`` has it, with what leaves out states of the programme
@@ -193,7 +193,7 @@ class LatencyRelaxation:
         """
         if len(self.layers.first) <= len(self.contacts):
             return None
-        weight = self._weight(prices, tolls)
+        weight = self._weight(multipliers, tolls)
         most, after = most_by_pairs(self.network, self.levels, self.layers, weight)
         fixing = Fixing(
             layers=self.layers,
@@ -204,12 +204,18 @@ class LatencyRelaxation:
         )
         return most, fixing
 
-    def _weight(self, prices: Floats, tolls: Tolls) -> Floats:
+    def _weight(self, multipliers: Floats, tolls: Tolls) -> Floats:
         weight = np.empty((len(self.layers.first), len(self.rows)))
         passed = 0.0 if self.may_need_all else NEVER
         earned = tolls.by_volume * self.terms.volume - tolls.antenna
         _weigh(
-            self.terms, self.layers, prices[self.target], tolls.by_volume, earned, passed, weight
+            self.terms,
+            self.layers,
+            multipliers[self.target],
+            tolls.by_volume,
+            earned,
+            passed,
+            weight,
         )
         return weight
 
@@ -249,7 +255,7 @@ class LatencyRelaxation:
 def _weigh(
     terms: _Terms,
     layers: Layers,
-    price: Floats,
+    multiplier: Floats,
     tolls: Floats,
     earned: Floats,
     passed: float,
@@ -275,7 +281,7 @@ def _weigh(
                     worth = min(worth, terms.most[k] - terms.on_board[k])
                     gain[k] = max(gain[k], worth - tolls[c] * terms.size[k])
         for k in range(m):
-            worth = terms.on_board[k] + gain[k] - price[k]
+            worth = terms.on_board[k] + gain[k] - multiplier[k]
             weight[layer, k] = worth if worth > 0.0 else passed
         if layer < num_layers - 1:
             for c in range(layers.first[layer], layers.first[layer + 1]):
@@ -310,31 +316,31 @@ def latency_relaxations(
 
 def latency_value(
     problem: Problem,
-    prices: Floats,
-    contact_prices: Floats,
-    antenna_prices: Floats | None = None,
+    multipliers: Floats,
+    contact_multipliers: Floats,
+    antenna_multipliers: Floats | None = None,
 ) -> float:
-    """Return the bound that prices of targets, of contacts and of antennas prove.
+    """Return the bound that multipliers of targets, of contacts and of antennas prove.
 
     This is the whole proof: it needs no search, only the problem.
 
     Parameters
     ----------
-    prices
+    multipliers
         Shape ``(num_targets,)``.
-    contact_prices
+    contact_multipliers
         By volume, of the table's contacts in order. Shape ``(num_contacts,)``.
-    antenna_prices
+    antenna_multipliers
         Of ``antenna_groups``; none by default.
     """
-    given = LatencyPrices.of(problem, prices, contact_prices, antenna_prices)
+    given = LatencyMultipliers.of(problem, multipliers, contact_multipliers, antenna_multipliers)
     relaxations = latency_relaxations(problem)
     gained = (one.most(given.targets, given.tolls_of(one))[0] for one in relaxations)
     return given.paid + sum(gained)
 
 
-class LatencyPrices(NamedTuple):
-    """Prices as the programmes take them.
+class LatencyMultipliers(NamedTuple):
+    """Multipliers as the programmes take them.
 
     Attributes
     ----------
@@ -343,7 +349,7 @@ class LatencyPrices(NamedTuple):
     by_volume, antenna
         Of each opportunity, what a contact asks. Shape ``(n,)``.
     paid
-        What all prices come to.
+        What all multipliers come to.
     """
 
     targets: Floats
@@ -354,16 +360,16 @@ class LatencyPrices(NamedTuple):
     @classmethod
     def of(
         cls, problem: Problem, targets: Floats, contacts: Floats, antennas: Floats | None
-    ) -> LatencyPrices:
-        """Return these prices, of contacts and antennas as ``latency_value`` has them."""
-        price = np.append(surplus(targets, problem.best_worth), 0.0)
+    ) -> LatencyMultipliers:
+        """Return these multipliers, of contacts and antennas as ``latency_value`` has them."""
+        multiplier = np.append(surplus(targets, problem.best_worth), 0.0)
         by_volume = np.zeros(len(problem.opportunities))
         by_volume[problem.opportunities.kind == CONTACT] = np.maximum(contacts, 0.0)
         return cls(
-            targets=price,
+            targets=multiplier,
             by_volume=by_volume,
             antenna=antenna_tolls(problem, antennas),
-            paid=float(price.sum()) + paid_for_antennas(problem, antennas),
+            paid=float(multiplier.sum()) + paid_for_antennas(problem, antennas),
         )
 
     def tolls_of(self, one: LatencyRelaxation) -> Tolls:

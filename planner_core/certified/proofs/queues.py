@@ -1,10 +1,10 @@
 r"""An upper bound where images are worth less the later they come down: queues before contacts.
 
-Prices of targets, as in ``latency``: for each satellite an exact programme knows which contact
+Multipliers of targets, as in ``latency``: for each satellite an exact programme knows which contact
 comes next and what waits for it (``planner_core.certified.dp.contact_queues``). Left out are
-antennas. Prices of contacts say which of them may follow each other in a plan that earns more than
-some level (``planner_core.certified.dp.contact_pairs``); what is left takes seconds where those
-prices take hundredths, and proves a percent more.
+antennas. Multipliers of contacts say which of them may follow each other in a plan that earns more
+than some level (``planner_core.certified.dp.contact_pairs``); what is left takes seconds where
+those multipliers take hundredths, and proves a percent more.
 """
 
 from __future__ import annotations
@@ -32,48 +32,51 @@ def is_supported(satellite: SatelliteProblem) -> bool:
 
 def queue_value(
     problem: Problem,
-    prices: Floats,
+    multipliers: Floats,
     per_collect: int,
     stop: Bytes | None = None,
     *,
-    contact_prices: Floats | None = None,
+    contact_multipliers: Floats | None = None,
     exact_contacts: Sequence[int] = (),
     level: float = -np.inf,
 ) -> tuple[float, Ints]:
-    """Return the bound that prices of targets prove, and the rows of paths that reach it.
+    """Return the bound that multipliers of targets prove, and the rows of paths that reach it.
 
-    Infinite where the programme would take too long, or ``stop`` is set. With prices of contacts
-    paths that by these earn no more than ``level`` are left out; the bound is ``level`` at least.
+    Infinite where the programme would take too long, or ``stop`` is set. With multipliers of
+    contacts paths that by these earn no more than ``level`` are left out; the bound is ``level`` at
+    least.
 
     Parameters
     ----------
-    prices
+    multipliers
         Shape ``(num_targets,)``.
     per_collect
         How many levels of energy a collect takes.
-    contact_prices
+    contact_multipliers
         As of ``latency_value``. Shape ``(num_contacts,)``.
     exact_contacts
         Rows of contacts whose energy is not rounded in favour of the satellite; that of others is.
     """
-    price = surplus(prices, problem.best_worth)
+    multiplier = surplus(multipliers, problem.best_worth)
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
-    value, paths = float(price.sum()), [np.empty(0, dtype=np.int32)]
+    value, paths = float(multiplier.sum()), [np.empty(0, dtype=np.int32)]
     satellites = {index: one for index, one in enumerate(problem.satellites) if len(one)}
     if not all(map(is_supported, satellites.values())):
         return np.inf, paths[0]
     exact = np.zeros(len(problem.opportunities), dtype=np.bool_)
     exact[[*exact_contacts, *problem.kept_rows.tolist()]] = True
     reduced: dict[int, Reduction] = {}
-    if contact_prices is not None:
-        reduced = reductions(problem, prices, contact_prices, level, per_collect, exact, stop)
+    if contact_multipliers is not None:
+        reduced = reductions(
+            problem, multipliers, contact_multipliers, level, per_collect, exact, stop
+        )
     for index, satellite in satellites.items():
         own = reduced.get(index)
         queues = queues_of(
             problem,
             satellite,
             network_of(problem, satellite),
-            price,
+            multiplier,
             per_collect=per_collect,
             num_classes=PROMISES,
             earliest=own.earliest if own else None,

@@ -1,11 +1,11 @@
-r"""An upper bound that battery and recorder tighten: prices, and exact dynamic programmes.
+r"""An upper bound that battery and recorder tighten: multipliers, and exact dynamic programmes.
 
-As in ``planner_core.certified.proofs.lagrangian`` each target has a price :math:`\lambda_i`, and
-no plan earns more than :math:`\sum_i \lambda_i` plus what each satellite can gain where an image of
-:math:`i` is worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its battery
-and its recorder allow, not only its agility. Worth is counted in whole units, rounded up, so the
-bound holds for any unit; prices chosen to leave whole units lose nothing by it. Where satellites
-want the same antennas at a time those have prices, too, which contacts pay
+As in ``planner_core.certified.proofs.lagrangian`` each target has a multiplier :math:`\lambda_i`,
+and no plan earns more than :math:`\sum_i \lambda_i` plus what each satellite can gain where an
+image of :math:`i` is worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its
+battery and its recorder allow, not only its agility. Worth is counted in whole units, rounded up,
+so the bound holds for any unit; multipliers chosen to leave whole units lose nothing by it. Where
+satellites want the same antennas at a time those have multipliers, too, which contacts pay
 (``planner_core.precedence.antennas``).
 """
 
@@ -28,41 +28,43 @@ from planner_core.worth import common_unit, surplus, weights
 
 
 def whole_worth(
-    problem: Problem, prices: Floats, unit: float, antenna_prices: Floats | None = None
+    problem: Problem, multipliers: Floats, unit: float, antenna_multipliers: Floats | None = None
 ) -> Ints:
-    """Return what each opportunity is worth at these prices, in units, rounded up.
+    """Return what each opportunity is worth at these multipliers, in units, rounded up.
 
     Contacts cost what their antennas do, or more than all images are worth: no path pays that.
     """
     table = problem.opportunities
     is_collect = table.kind == COLLECT
     units = np.zeros(len(table), dtype=np.int32)
-    price = np.maximum(prices[table.place[is_collect]], 0.0)
-    worth = weights(problem.worth[is_collect], price)
+    multiplier = np.maximum(multipliers[table.site[is_collect]], 0.0)
+    worth = weights(problem.worth[is_collect], multiplier)
     units[is_collect] = np.maximum(np.ceil(worth / unit - ROUNDING), 0.0)
-    if antenna_prices is not None:
-        tolls = antenna_tolls(problem, antenna_prices)
+    if antenna_multipliers is not None:
+        tolls = antenna_tolls(problem, antenna_multipliers)
         most = int(units.sum(dtype=np.int64)) + 1
         units[~is_collect] = -np.minimum(np.floor(tolls[~is_collect] / unit + ROUNDING), most)
     return units
 
 
 def resource_value(
-    problem: Problem, prices: Floats, unit: float, antenna_prices: Floats | None = None
+    problem: Problem, multipliers: Floats, unit: float, antenna_multipliers: Floats | None = None
 ) -> float:
-    """Return the bound that prices of targets, and of antennas if there are any, prove.
+    """Return the bound that multipliers of targets, and of antennas if there are any, prove.
 
     This is the whole proof: it needs no search, only the problem. However finely the recorder is
     counted the bound holds; as neither fineness is always better, the lower bound counts.
     """
     stop = np.zeros(1, dtype=np.uint8)
     return min(
-        _value(problem, relaxations(problem, levels), prices, unit, 0.0, stop, antenna_prices)
+        _value(
+            problem, relaxations(problem, levels), multipliers, unit, 0.0, stop, antenna_multipliers
+        )
         for levels in (TUNING.fine, TUNING.coarse)
     )
 
 
-def value_at(problem: Problem, prices: Floats, unit: float, enough: float) -> float:
+def value_at(problem: Problem, multipliers: Floats, unit: float, enough: float) -> float:
     """Return the bound of ``resource_value``, or ``enough`` where that is more.
 
     The finer recorder is asked where one satellite is to be asked, which may stop early.
@@ -70,22 +72,22 @@ def value_at(problem: Problem, prices: Floats, unit: float, enough: float) -> fl
     stop = np.zeros(1, dtype=np.uint8)
     is_alone = sum(len(s) > 0 for s in problem.satellites) == 1
     levels = TUNING.fine if is_alone else TUNING.coarse
-    return _value(problem, relaxations(problem, levels), prices, unit, enough, stop)
+    return _value(problem, relaxations(problem, levels), multipliers, unit, enough, stop)
 
 
 def _value(
     problem: Problem,
     satellites: tuple[SatelliteRelaxation, ...],
-    prices: Floats,
+    multipliers: Floats,
     unit: float,
     enough: float,
     stop: Bytes,
-    antenna_prices: Floats | None = None,
+    antenna_multipliers: Floats | None = None,
 ) -> float:
-    """Return the bound of these prices, or ``enough`` where that is more."""
-    prices = surplus(prices, problem.best_worth)
-    worth = whole_worth(problem, prices, unit, antenna_prices)
-    paid = float(prices.sum()) + paid_for_antennas(problem, antenna_prices)
+    """Return the bound of these multipliers, or ``enough`` where that is more."""
+    multipliers = surplus(multipliers, problem.best_worth)
+    worth = whole_worth(problem, multipliers, unit, antenna_multipliers)
+    paid = float(multipliers.sum()) + paid_for_antennas(problem, antenna_multipliers)
     # What the other satellites gain is known only afterwards: one alone may stop early.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
     units = sum(s.most(worth, unit, max(units_enough, 0), stop)[0] for s in satellites)
@@ -106,7 +108,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
         return best
     if problem.counts_delivery and problem.objective.half_life_s is not None:
         return _with_half_life(problem, best, reward)
-    # Where all targets are worth the same and energy is short, prices of zero are best.
+    # Where all targets are worth the same and energy is short, multipliers of zero are best.
     is_plain = len(problem.satellites) == 1 and _is_alike(problem)
     satellites: tuple[SatelliteRelaxation, ...] = ()
     if problem.use_resources:
@@ -119,27 +121,29 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     num_units = best.value / unit / len(satellites)
     if num_units * max(satellite.num_near_steps for satellite in satellites) > MAX_STEPS:
         return best
-    start = np.zeros(1) if best.prices is None else best.prices
-    offered = [leaving_whole_units(problem, share * start, unit) for share in TUNING.price_shares]
+    start = np.zeros(1) if best.multipliers is None else best.multipliers
+    offered = [
+        leaving_whole_units(problem, share * start, unit) for share in TUNING.multiplier_shares
+    ]
     if is_plain:
         offered = offered[:1]
     else:
         # What the battery alone allows takes a fraction of the time, and tells which are best.
-        offered.sort(key=lambda prices: _battery_value(problem, satellites, prices, unit))
-    for prices in offered[: TUNING.tries]:
-        value = _value(problem, satellites, prices, unit, reward, stop)
+        offered.sort(key=lambda multipliers: _battery_value(problem, satellites, multipliers, unit))
+    for multipliers in offered[: TUNING.tries]:
+        value = _value(problem, satellites, multipliers, unit, reward, stop)
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
-            best = Bound(value=rounded, proof="dp", prices=prices, unit=unit)
+            best = Bound(value=rounded, proof="dp", multipliers=multipliers, unit=unit)
     return best
 
 
 def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
     """Return a bound that knows what contacts take, which counts for more than recorders."""
-    assert best.prices is not None
+    assert best.multipliers is not None
     num_rounds = TUNING.latency_work // max(1, len(problem.opportunities))
     num_rounds = int(np.clip(num_rounds, TUNING.tries, TUNING.rounds))
-    ascent = LatencyAscent(problem, best.prices)
+    ascent = LatencyAscent(problem, best.multipliers)
     ascent.improve(num_rounds, reward, np.zeros(1, dtype=np.uint8))
     bound = ascent.bound()
     value = rounded_bound(problem, bound.value, reward)
@@ -147,11 +151,11 @@ def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
 
 
 def _battery_value(
-    problem: Problem, satellites: tuple[SatelliteRelaxation, ...], prices: Floats, unit: float
+    problem: Problem, satellites: tuple[SatelliteRelaxation, ...], multipliers: Floats, unit: float
 ) -> float:
     """Return what bounds all plans where recorders are left out."""
-    worth = whole_worth(problem, prices, unit)
-    return float(prices.sum()) + unit * sum(s.most_by_battery(worth) for s in satellites)
+    worth = whole_worth(problem, multipliers, unit)
+    return float(multipliers.sum()) + unit * sum(s.most_by_battery(worth) for s in satellites)
 
 
 def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:
@@ -167,9 +171,9 @@ def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: 
 
 
 def leaving_whole_units(
-    problem: Problem, prices: Floats, unit: float, typical: Floats | None = None
+    problem: Problem, multipliers: Floats, unit: float, typical: Floats | None = None
 ) -> Floats:
-    """Return the nearest prices at which an image of each target is worth a whole number of units.
+    """Return the nearest multipliers at which an image of each target is worth whole units.
 
     Other images of it are then rounded up, which costs a bound up to a unit for each that is
     taken: the typical one should be the one that plans take.
@@ -180,7 +184,7 @@ def leaving_whole_units(
         What that image earns; by default the best of the target. Shape ``(num_targets,)``.
     """
     worth = problem.best_worth if typical is None else typical
-    units = np.round((worth - prices) / unit)
+    units = np.round((worth - multipliers) / unit)
     return np.clip(worth - units * unit, 0.0, problem.best_worth)
 
 

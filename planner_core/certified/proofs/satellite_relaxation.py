@@ -42,7 +42,7 @@ class SatelliteRelaxation:
         must come down: what may be left at the end hangs on that. The same levels otherwise.
     shares
         What images earn less that stay on board, where they earn something there.
-    data_price
+    data_multiplier
         What the data of a collect is worth, about, in typical collects.
     """
 
@@ -51,7 +51,7 @@ class SatelliteRelaxation:
     levels: DataLevels
     classes: tuple[DataLevels, ...]
     shares: Shares | None = None
-    data_price: float = 0.0
+    data_multiplier: float = 0.0
 
     @classmethod
     def of(
@@ -73,8 +73,8 @@ class SatelliteRelaxation:
         passes = 1 if self.shares is None else 1 + len(self.shares.since_s).bit_length()
         return passes * len(self.network.near_rows)
 
-    def with_data_price(self, num_images: int) -> SatelliteRelaxation:
-        """Return the same with the price of data at which the battery alone allows least.
+    def with_data_multiplier(self, num_images: int) -> SatelliteRelaxation:
+        """Return the same with the multiplier of data at which the battery alone allows least.
 
         Parameters
         ----------
@@ -87,11 +87,13 @@ class SatelliteRelaxation:
         weight = np.where(self.satellite.kind == COLLECT, num_units, 0).astype(np.int32)
         best, least, near = self, np.inf, num_units * num_images
         for units in range(num_units):
-            trial = replace(self, data_price=units / num_units)
-            needs = _Needs.of(self.network, self.levels, weight, trial._price_in(weight), near)
+            trial = replace(self, data_multiplier=units / num_units)
+            needs = _Needs.of(
+                self.network, self.levels, weight, trial._level_multiplier(weight), near
+            )
             if needs.top >= least:
                 break
-            # A higher price allows less, or is the last: its tables need be no larger.
+            # A higher multiplier allows less, or is the last: its tables need be no larger.
             best, least, near = trial, needs.top, needs.top
         return best
 
@@ -231,7 +233,7 @@ class SatelliteRelaxation:
             In units, of each task of the satellite and of each level at the end. Shapes ``(m,)``
             and ``(num_levels,)``.
         """
-        needs = _Needs.of(self.network, levels, weight, self._price_in(weight), near)
+        needs = _Needs.of(self.network, levels, weight, self._level_multiplier(weight), near)
         top = needs.top
         step = max(1, int(TUNING.little * top))
         goal = top
@@ -253,12 +255,12 @@ class SatelliteRelaxation:
             goal, step = goal - 1, 2 * step
         return UNREACHED, None
 
-    def _price_in(self, weight: Ints) -> float:
-        """Return the price of a level in units, at which the least collect costs whole units."""
+    def _level_multiplier(self, weight: Ints) -> float:
+        """Return a level's multiplier in units, so that the least collect costs whole units."""
         typical = float(weight[weight > 0].mean()) if np.any(weight > 0) else 0.0
         filled = self.levels.gain[self.levels.gain > 0]
         least = int(filled.min()) if len(filled) else 1
-        return float(np.round(self.data_price * typical)) / least
+        return float(np.round(self.data_multiplier * typical)) / least
 
 
 def _classes(
@@ -292,11 +294,12 @@ def _classes(
 
 
 class _Needs(NamedTuple):
-    """The least energy to gain so much from each task on, where data has a price.
+    """The least energy to gain so much from each task on, where data has a multiplier.
 
-    At a price for each level of the recorder images are worth less, and contacts what they take
-    down at most. That leaves the limits of the recorder out, and yet not for nothing: what is
-    gained from a level on is no more than that worth, and the price of the levels that are free.
+    At a multiplier for each level of the recorder images are worth less, and contacts what they
+    take down at most. That leaves the limits of the recorder out, and yet not for nothing: what is
+    gained from a level on is no more than that worth, and the multiplier of the levels that are
+    free.
 
     Attributes
     ----------
@@ -315,13 +318,13 @@ class _Needs(NamedTuple):
 
     @classmethod
     def of(
-        cls, network: Network, levels: DataLevels, weight: Ints, price: float, near: int | None
+        cls, network: Network, levels: DataLevels, weight: Ints, multiplier: float, near: int | None
     ) -> _Needs:
         change = np.maximum(levels.gain, levels.floor - levels.before)
-        priced = np.ceil(weight - price * change - ROUNDING)
+        priced = np.ceil(weight - multiplier * change - ROUNDING)
         priced = np.maximum(priced, 0.0).astype(np.int32)
         free = np.maximum(levels.end - np.arange(levels.num_levels), 0)
-        credit = np.ceil(price * free - ROUNDING).astype(np.int32)
+        credit = np.ceil(multiplier * free - ROUNDING).astype(np.int32)
         at_start = int(credit[min(levels.start, levels.num_levels - 1)])
         limit = int(1.07 * near) if near is not None else 0
         limit += 128 + int(priced.max(initial=0))

@@ -27,15 +27,16 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shares:
-    r"""What images earn less that stay on board, as a price of what a recorder holds at the end.
+    r"""What images lose by staying on board, as a multiplier of the data left at the end.
 
-    An image that stays is worth :math:`w_k - l_k` at the prices of the targets, one that comes down
-    :math:`w_k`. A recorder holds what was recorded last. For any instant :math:`T` either something
-    recorded before it stays, and then all images from there on do: a plan gains no more than with
-    :math:`w_k - l_k` for those. Or nothing does, and then the images that ended later fill what the
-    recorder holds at the end but for the telemetry since :math:`T`: :math:`\sum_{stay} s_k \ge g`.
-    For any :math:`\mu \ge 0` such a plan gains at most :math:`\sum_k w_k` of the images before and
-    :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` of those after it.
+    An image that stays is worth :math:`w_k - l_k` at the multipliers of the targets, one that comes
+    down :math:`w_k`. A recorder holds what was recorded last. For any instant :math:`T` either
+    something recorded before it stays, and then all images from there on do: a plan gains no more
+    than with :math:`w_k - l_k` for those. Or nothing does, and then the images that ended later
+    fill what the recorder holds at the end but for the telemetry since :math:`T`:
+    :math:`\sum_{stay} s_k \ge g`. For any :math:`\mu \ge 0` such a plan gains at most :math:`\sum_k
+    w_k` of the images before and :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` of those
+    after it.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ def totals_bound(problem: Problem) -> Bound | None:
     room_s = sum(_image_room_s(problem, satellite) for satellite in problem.satellites)
     collects = table.kind == COLLECT
     length_s = np.full(len(problem.target_ids), np.inf)
-    np.minimum.at(length_s, table.place[collects], table.end_s[collects] - table.start_s[collects])
+    np.minimum.at(length_s, table.site[collects], table.end_s[collects] - table.start_s[collects])
     offered = np.flatnonzero(np.isfinite(length_s))
     worth_per_s = problem.best_worth[offered] / length_s[offered]
     value = 0.0

@@ -1,6 +1,6 @@
 """Without resources: multipliers, window search, cutting planes, and HiGHS for what is left.
 
-Whatever the prices of targets and cuts, they tell of each task what a plan that holds it can
+Whatever the multipliers of targets and cuts, they tell of each task what a plan that holds it can
 earn at most. Tasks that no better plan can hold are struck out, so that the rest becomes ever
 smaller, for the search as well as for the proof.
 """
@@ -46,13 +46,13 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import restricted
 
 
-class FreeSearch:
+class AgilitySearch:
     """A plan, a bound, and the tasks that a better plan can hold."""
 
     def __init__(self, best: Incumbent, seed: int) -> None:
         self.best, self.problem, self.budget = best, best.problem, best.budget
         self.seed = seed
-        self.steps = [Multipliers(prices=self.problem.best_worth)]
+        self.steps = [Multipliers(of_targets=self.problem.best_worth)]
         self.is_transitive = is_transitive(self.problem)
         self._rows = np.arange(len(self.problem.opportunities), dtype=np.int32)
         self._rest = self.problem
@@ -61,7 +61,7 @@ class FreeSearch:
         self._windows: WindowSearch | None = None
         self._window_rows: Ints = self._rows[:0]
         self._network = network_of(self.problem)
-        self._prices: Ascent | None = None
+        self._ascent: Ascent | None = None
         self._certified = accessible(self.problem).value
         self.through: Floats = np.full(len(self._rows), self._certified)
 
@@ -77,7 +77,7 @@ class FreeSearch:
         self.best.lower(Bound(value=value, proof="lagrangian"))
 
     def step(self, step: Multipliers) -> None:
-        """Learn from prices: a bound, and of each open task what it can be part of."""
+        """Learn from multipliers: a bound, and of each open task what it can be part of."""
         total, through = values_through(
             self.problem, self._network, self._rows, step, ~self.is_struck
         )
@@ -104,20 +104,22 @@ class FreeSearch:
         self._rest = restricted(self.problem, self._rows)
         self._network = network_of(self._rest)
 
-    def price(self) -> None:
-        """Search for prices anew over what is open."""
+    def ascend(self) -> None:
+        """Search for multipliers anew over what is open."""
         ascent = ascent_on_paths(self._rest, self._network, default_epochs(len(self._rows)), 0)
         ascent.run(self.best.reward, self.budget.stop)
-        self.step(Multipliers(prices=ascent.multipliers))
+        self.step(Multipliers(of_targets=ascent.multipliers))
 
-    def price_passes(self, num_epochs: int) -> None:
-        """Search for prices by which no target is paid twice in one pass over it, so long."""
-        if self._prices is None:
-            self._prices = ascent_on_passes(self.problem, self.seed)
-        self._prices.improve(num_epochs, self.budget.stop)
-        value, prices = self._prices.value, self._prices.multipliers
-        self.best.lower(Bound(value=value, proof="lagrangian", prices=prices, is_elementary=True))
-        self.best.report("prices")
+    def ascend_on_passes(self, num_epochs: int) -> None:
+        """Search for multipliers by which no target is paid twice in one pass over it, so long."""
+        if self._ascent is None:
+            self._ascent = ascent_on_passes(self.problem, self.seed)
+        self._ascent.improve(num_epochs, self.budget.stop)
+        value, multipliers = self._ascent.value, self._ascent.multipliers
+        self.best.lower(
+            Bound(value=value, proof="lagrangian", multipliers=multipliers, is_elementary=True)
+        )
+        self.best.report("multipliers")
 
     @property
     def is_small(self) -> bool:
@@ -128,9 +130,9 @@ class FreeSearch:
         )
 
     @property
-    def is_priced_out(self) -> bool:
-        """Whether prices of targets alone will not bring the bound down any more."""
-        return self._prices is not None and self._prices.is_settled
+    def is_settled(self) -> bool:
+        """Whether multipliers of targets alone will not bring the bound down any more."""
+        return self._ascent is not None and self._ascent.is_settled
 
     def search(self, moves_per_task: float, rows: Ints) -> bool:
         """Search windows among some of the problem's tasks; return whether that helped."""
@@ -159,7 +161,7 @@ class FreeSearch:
         return self._rows[~is_below(self.through, amount)]
 
     def cut(self, max_rounds: int) -> Generator[None, None, Master]:
-        """Price with cutting planes, a round at a time, until that leads no further.
+        """Multiplier with cutting planes, a round at a time, until that leads no further.
 
         Returns the relaxation.
         """
@@ -180,8 +182,9 @@ class FreeSearch:
                 break
             master.allow(~self.is_struck)
             gap = max(bounds[-1] - self.best.better, 1e-9)
-            # Until paths are priced nearly as well as by the subgradient, odd sets lead astray.
-            num_added = master.cut(taken, with_odd_sets=bounds[-1] <= priced + 0.2 * gap)
+            # Until paths are priced nearly as well as by the subgradient, zero-half cuts lead
+            # astray.
+            num_added = master.cut(taken, with_zero_half_cuts=bounds[-1] <= priced + 0.2 * gap)
             is_stalled = (
                 len(bounds) > TUNING.patience
                 and bounds[-1 - TUNING.patience] - bounds[-1] < TUNING.little * gap
@@ -252,16 +255,16 @@ class FreeSearch:
         return Bound(value=value, proof="lagrangian", certificate=certificate)
 
 
-def _engine(search: Search) -> FreeSearch:
-    engine = search.engine(FreeSearch)
+def _engine(search: Search) -> AgilitySearch:
+    engine = search.engine(AgilitySearch)
     search.proof = engine.proof
     return engine
 
 
 def path_multipliers(search: Search) -> Iterator[None]:
     """Ascend on the longest paths of a satellite, once."""
-    _engine(search).price()
-    search.best.report("prices")
+    _engine(search).ascend()
+    search.best.report("multipliers")
     yield
 
 
@@ -273,8 +276,8 @@ def pass_multipliers(search: Search) -> Iterator[None]:
     engine, best = _engine(search), search.best
     known = best.bound.value
     num_epochs = TUNING.many_epochs if is_shared(search.problem) else TUNING.epochs_at_a_time
-    while not engine.is_priced_out:
-        engine.price_passes(num_epochs)
+    while not engine.is_settled:
+        engine.ascend_on_passes(num_epochs)
         if best.bound.value < known or best.is_done:
             yield
 
@@ -303,10 +306,10 @@ def cutting_planes(search: Search) -> Iterator[None]:
     yield from cut_and_prove(engine, search.effort)
 
 
-def cut_and_prove(engine: FreeSearch, effort: Effort) -> Iterator[None]:
+def cut_and_prove(engine: AgilitySearch, effort: Effort) -> Iterator[None]:
     """Cut, then let HiGHS look for a better plan, or prove that there is none."""
     best = engine.best
-    engine.price()
+    engine.ascend()
     yield
     master = yield from engine.cut(effort.max_rounds)
     while not best.is_done:

@@ -63,9 +63,9 @@ def chain_multipliers(search: Search) -> Iterator[None]:
     best = search.best
     for proven in ascend_on_chains(search.problem, search.budget.stop):
         if proven is not None:
-            value, prices = proven
-            best.lower(Bound(value=value, proof="lagrangian", prices=prices))
-            best.report("prices")
+            value, multipliers = proven
+            best.lower(Bound(value=value, proof="lagrangian", multipliers=multipliers))
+            best.report("multipliers")
         if proven is not None or best.is_done:
             yield
 

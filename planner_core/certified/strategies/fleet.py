@@ -1,10 +1,10 @@
-"""Many satellites without resources: incremental prices, and a search that heeds them.
+"""Many satellites without resources: incremental multipliers, and a search that heeds them.
 
-A high price says that a target is easily had: several satellites would take it. A first plan at
-these prices gives each satellite about its share. The window search goes on from there, and what
-its streams come to is merged. What is small enough goes on to cutting planes and HiGHS, as a single
-satellite does. For a large fleet there is time for few moves: its search begins them where a target
-has a price and is not imaged, and takes only tasks that cost the bound little.
+A high multiplier says that a target is easily had: several satellites would take it. A first plan
+at these multipliers gives each satellite about its share. The window search goes on from there, and
+what its streams come to is merged. What is small enough goes on to cutting planes and HiGHS, as a
+single satellite does. For a large fleet there is time for few moves: its search begins them where a
+target has a multiplier and is not imaged, and takes only tasks that cost the bound little.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.lns.fleet_start import priced_start
+from planner_core.certified.lns.fleet_start import start_at_multipliers
 from planner_core.certified.lns.search import WindowSearch, num_choices
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.paths import ascent_on_paths
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Multipliers
 from planner_core.certified.side_by_side import side_by_side
-from planner_core.certified.strategies.agility import FreeSearch, cut_and_prove
+from planner_core.certified.strategies.agility import AgilitySearch, cut_and_prove
 from planner_core.certified.strategies.supports import is_small_free_fleet
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.network import heaviest_through, network_of
@@ -44,31 +44,33 @@ class FleetSearch:
         self._dual = ascent_on_paths(self.problem, self._network, TUNING.epochs, seed)
 
     @property
-    def prices(self) -> Floats:
+    def multipliers(self) -> Floats:
         """The multipliers that prove the bound. Shape ``(num_targets,)``."""
         return self._dual.multipliers
 
-    def price(self, num_epochs: float = math.inf) -> None:
-        """Search for prices, so long or until more steps are of little use."""
+    def ascend(self, num_epochs: float = math.inf) -> None:
+        """Search for multipliers, so long or until more steps are of little use."""
         while num_epochs > 0 and not (self._dual.is_settled or self.best.is_done):
             self._dual.improve(TUNING.epochs_at_a_time, self.budget.stop)
-            bound = Bound(value=self._dual.value, proof="lagrangian", prices=self.prices)
+            bound = Bound(value=self._dual.value, proof="lagrangian", multipliers=self.multipliers)
             self.best.lower(bound)
-            self.best.report("prices")
+            self.best.report("multipliers")
             num_epochs -= TUNING.epochs_at_a_time
 
     def start(self) -> None:
-        """Plan one stretch after another at the prices."""
+        """Plan one stretch after another at the multipliers."""
         if self.best.is_done:
             return
-        self.best.offer(self._priced_plan(self._seed))
+        self.best.offer(self._plan_at_multipliers(self._seed))
         self.best.report("start")
 
-    def _priced_plan(self, seed: int) -> Plan:
+    def _plan_at_multipliers(self, seed: int) -> Plan:
         table, kept = self.problem.opportunities, self.problem.kept_rows
         taken = np.zeros(len(self.problem.target_ids) + 1, dtype=np.bool_)
-        taken[table.place[kept[table.kind[kept] == COLLECT]]] = True
-        rows = priced_start(self._network, self._worth, np.append(self.prices, 0.0), taken, seed)
+        taken[table.site[kept[table.kind[kept] == COLLECT]]] = True
+        rows = start_at_multipliers(
+            self._network, self._worth, np.append(self.multipliers, 0.0), taken, seed
+        )
         return Plan.of(self.problem, rows).with_kept(self.problem)
 
     def search(self, moves_per_task: float) -> Iterator[None]:
@@ -116,9 +118,9 @@ class FleetSearch:
 
         Shape ``(num_opportunities,)``.
         """
-        price = np.append(self.prices, 0.0)[self._network.place]
-        total, through = heaviest_through(self._network, weights(self._worth, price))
-        cost = total - through + np.maximum(price - self._worth, 0.0)
+        multiplier = np.append(self.multipliers, 0.0)[self._network.site]
+        total, through = heaviest_through(self._network, weights(self._worth, multiplier))
+        cost = total - through + np.maximum(multiplier - self._worth, 0.0)
         is_near = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
         is_near[self._network.row] = cost <= TUNING.near * self._worth
         return is_near
@@ -128,11 +130,11 @@ class FleetSearch:
         preference = None
         if not is_small_free_fleet(self.problem):
             # Satellites hardly compete for targets with low multipliers: those are hard to have.
-            wanted = np.minimum(self.prices / np.maximum(self.problem.best_worth, 1e-300), 1.0)
+            wanted = np.minimum(self.multipliers / np.maximum(self.problem.best_worth, 1e-300), 1.0)
             preference = 1.0 + TUNING.preference * (0.5 - wanted)
         seed = self._seed + number
         windows = WindowSearch(self.problem, seed, self._network, preference)
-        windows.adopt(self.best.plan if number == 0 else self._priced_plan(seed))
+        windows.adopt(self.best.plan if number == 0 else self._plan_at_multipliers(seed))
         return windows
 
 
@@ -140,7 +142,7 @@ def fleet_multipliers(search: Search) -> Iterator[None]:
     """Ascend on the longest paths of all satellites, and plan at the multipliers."""
     fleet = search.engine(FleetSearch)
     for num_epochs in (TUNING.many_epochs, math.inf):
-        fleet.price(num_epochs)
+        fleet.ascend(num_epochs)
         fleet.start()
         yield
 
@@ -155,8 +157,8 @@ def fleet_cutting_planes(search: Search) -> Iterator[None]:
     fleet = search.engine(FleetSearch)
     if search.effort.max_rounds == 0:
         return
-    engine = search.engine(FreeSearch)
+    engine = search.engine(AgilitySearch)
     search.proof = engine.proof
-    engine.step(Multipliers(prices=fleet.prices))
+    engine.step(Multipliers(of_targets=fleet.multipliers))
     if not search.best.is_done:
         yield from cut_and_prove(engine, search.effort)

@@ -16,7 +16,7 @@ import numpy as np
 from planner_core.budget import Progress
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.alternating import AlternatingSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.queue_plans import plan_with_queues
 from planner_core.certified.lns.settled_contacts import served, with_contacts
@@ -151,7 +151,7 @@ def plans_by_contacts(search: Search) -> Iterator[None]:
         contacts = next((one for one in offered if one not in tried), own)
         tried.add(contacts)
         levels = TUNING.levels_per_collect // (1 if number else 2)
-        _plan_with(best, contacts, shared.prices, engine.unit, search.seed + number, levels)
+        _plan_with(best, contacts, shared.multipliers, engine.unit, search.seed + number, levels)
         number += 1
         yield
 
@@ -168,7 +168,7 @@ def _near(
 def _plan_with(
     best: Incumbent,
     contacts: tuple[int, ...],
-    prices: Floats,
+    multipliers: Floats,
     unit: float,
     seed: int,
     per_collect: int,
@@ -177,7 +177,7 @@ def _plan_with(
     problem, stop = best.problem, best.budget.stop
     taken = served(problem, contacts)
     rng = np.random.default_rng(seed)
-    plan = plan_with_queues(taking(problem, taken), prices, rng, stop, per_collect)
+    plan = plan_with_queues(taking(problem, taken), multipliers, rng, stop, per_collect)
     is_known = plan is not None
     part = with_contacts(problem, taken, plan, best.judge(plan) if plan else None)
     if plan is None:
@@ -205,6 +205,6 @@ def _bettered(
     """Return a plan that is better by windows, and by choices of tasks unless it is from queues."""
     if is_known:
         return bettered_by_windows(best, part, plan, seed)
-    turns = TurnSearch(part, plan, unit, best.budget, seed)
-    turns.turn(TUNING.tries)
-    return turns.plan
+    alternating = AlternatingSearch(part, plan, unit, best.budget, seed)
+    alternating.step(TUNING.tries)
+    return alternating.plan

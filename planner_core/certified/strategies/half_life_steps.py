@@ -10,7 +10,7 @@ from dataclasses import replace
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.multipliers.latency import LatencyAscent
-from planner_core.certified.multipliers.queues import priced_by_queues
+from planner_core.certified.multipliers.queues import multipliers_by_queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.queues import queue_value
@@ -30,18 +30,18 @@ class Contacts:
 
     def __init__(self, best: Incumbent, _seed: int) -> None:
         self._best = best
-        known = best.bound.prices
+        known = best.bound.multipliers
         if known is None:
-            known = lagrangian_bound(best.problem, best.reward).prices
+            known = lagrangian_bound(best.problem, best.reward).multipliers
         assert known is not None
         self.ascent = LatencyAscent(best.problem, known)
-        self._prices: Floats | None = None
+        self._multipliers: Floats | None = None
         self.named: list[tuple[int, ...]] = []
 
     @property
-    def prices(self) -> Floats:
+    def multipliers(self) -> Floats:
         """The multipliers of targets. Shape ``(num_targets,)``."""
-        return self.ascent.prices if self._prices is None else self._prices
+        return self.ascent.multipliers if self._multipliers is None else self._multipliers
 
     def lower(self, num_rounds: int, *, is_last: bool = False) -> None:
         """Go on with the ascent for a while, at most for a part of the time that is left."""
@@ -55,13 +55,13 @@ class Contacts:
             ascent.improve(1, level, best.budget.stop)
         bound = ascent.bound(is_last=is_last)
         best.lower(replace(bound, value=rounded_bound(best.problem, bound.value, best.reward)))
-        best.report("prices")
+        best.report("multipliers")
 
     def name(self) -> None:
         """Find contacts, with few levels of energy at first, and multipliers."""
         hoped = max(self._best.reward, (1.0 - 2.0 * TUNING.little) * self.ascent.value)
         self._find(TUNING.fine, hoped)
-        self._price()
+        self._ascend()
 
     def prove(self) -> None:
         """Prove a bound, which may name other contacts."""
@@ -69,28 +69,28 @@ class Contacts:
             known = self.named[-1]
             self._find(TUNING.levels_per_collect, self._best.reward)
             if self.named[-1] != known:
-                self._price()
+                self._ascend()
 
-    def _price(self) -> None:
+    def _ascend(self) -> None:
         if self.named and not self._best.is_done:
-            self._prices = priced_by_queues(
+            self._multipliers = multipliers_by_queues(
                 self._best.problem,
                 self.named[-1],
-                self.prices,
+                self.multipliers,
                 TUNING.rounds // 2,
                 self._best.budget.stop,
             )
 
     def _find(self, per_collect: int, level: float) -> None:
         """Let exact programmes of queues bound the plans and name the contacts of the best one."""
-        best, contact_prices = self._best, self.ascent.contact_prices
+        best, contact_multipliers = self._best, self.ascent.contact_multipliers
         exact = self.named[-1] if self.named else ()
         value, rows = queue_value(
             best.problem,
-            self.prices,
+            self.multipliers,
             per_collect,
             best.budget.stop,
-            contact_prices=contact_prices,
+            contact_multipliers=contact_multipliers,
             exact_contacts=exact,
             level=level,
         )
@@ -98,8 +98,8 @@ class Contacts:
             Bound(
                 value=value,
                 proof="dp",
-                prices=self.prices,
-                contact_prices=contact_prices,
+                multipliers=self.multipliers,
+                contact_multipliers=contact_multipliers,
                 queue_levels=per_collect,
                 exact_contacts=exact,
             )

@@ -1,4 +1,4 @@
-"""With battery and recorder, several satellites: plans and prices side by side."""
+"""With battery and recorder, several satellites: plans and multipliers side by side."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.mip.antenna_prices import antenna_prices
+from planner_core.certified.mip.antenna_multipliers import antenna_multipliers
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
-from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.side_by_side import side_by_side
 from planner_core.certified.strategies.resource_steps import ResourceSearch
@@ -27,9 +27,9 @@ from planner_core.problem import Floats
 def plans_and_multipliers(search: Search) -> Iterator[None]:
     """Search for plans and multipliers side by side, until the multipliers have settled."""
     engine, plans = search.engine(ResourceSearch), search.engine(FleetPlans)
-    pricing = plans.pricing(engine)
-    while not (pricing.is_settled or search.best.is_done):
-        plans.go_on(engine, pricing)
+    ascent = plans.ascent(engine)
+    while not (ascent.is_settled or search.best.is_done):
+        plans.go_on(engine, ascent)
         yield
 
 
@@ -40,14 +40,14 @@ def plans_and_programs(search: Search) -> Iterator[None]:
     the bound comes last: with rewards of 1 to 10 four satellites are at 6.4 % after 20 s.
     """
     engine, plans = search.engine(ResourceSearch), search.engine(FleetPlans)
-    pricing = plans.pricing(engine)
-    while pricing.prices is None and not (pricing.is_settled or search.best.is_done):
-        plans.go_on(engine, pricing)
+    ascent = plans.ascent(engine)
+    while ascent.exact is None and not (ascent.is_settled or search.best.is_done):
+        plans.go_on(engine, ascent)
         yield
     if search.best.is_done:
         return
     programs = ProgramSearch(
-        search.problem, plans.pool, engine.price_search, pricing, search.budget, search.seed
+        search.problem, plans.pool, engine.resource_ascent, ascent, search.budget, search.seed
     )
     # A small fleet has programs for sets of contacts, and the whole one, when this has ended.
     patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
@@ -69,53 +69,55 @@ class FleetPlans:
     def __init__(self, best: Incumbent, seed: int) -> None:
         self._best, self._known = best, best.reward
         self.pool = PlanPool(best.problem, best.budget, seed)
-        self._pricing: FleetPricing | None = None
+        self._ascent: FleetAscent | None = None
 
-    def pricing(self, search: ResourceSearch) -> FleetPricing:
+    def ascent(self, search: ResourceSearch) -> FleetAscent:
         """Return the search for multipliers, the same one for all strategies."""
-        if self._pricing is None:
-            self._pricing = FleetPricing(search)
-        return self._pricing
+        if self._ascent is None:
+            self._ascent = FleetAscent(search)
+        return self._ascent
 
-    def go_on(self, search: ResourceSearch, other: FleetPricing | ProgramSearch) -> bool:
+    def go_on(self, search: ResourceSearch, other: FleetAscent | ProgramSearch) -> bool:
         """Let the search for plans and another go on side by side; return whether a plan is better.
 
         That search learns from no other: it would lead nowhere new from their plans. Where other
         strategies have found a better plan, it goes on from that.
         """
-        best, turns = self._best, search.turn_search
+        best, alternating = self._best, search.alternating_search
         if best.reward > self._known:
-            turns.adopt(best.plan)
+            alternating.adopt(best.plan)
         with side_by_side(best.budget.num_threads) as together:
-            together(partial(turns.turn, other.steps_beside), partial(self._merge_after, other))
-        self.pool.learn(turns.ended, turns.plan)
-        is_better = [search.offer(plan) for plan in (turns.plan, self.pool.plan)]
+            together(
+                partial(alternating.step, other.steps_beside), partial(self._merge_after, other)
+            )
+        self.pool.learn(alternating.ended, alternating.plan)
+        is_better = [search.offer(plan) for plan in (alternating.plan, self.pool.plan)]
         best.report("plans")
         self._known = best.reward
         return any(is_better)
 
-    def _merge_after(self, other: FleetPricing | ProgramSearch) -> None:
-        other.turn()
+    def _merge_after(self, other: FleetAscent | ProgramSearch) -> None:
+        other.step()
         self.pool.merge()
 
 
-class FleetPricing:
-    """Prices by energy alone, then by relaxations with the plan's contacts; and what they prove.
+class FleetAscent:
+    """Multipliers by energy alone, then from relaxations with the plan's contacts; their bound.
 
     To search with the exact programmes takes fifty times as long as with energy alone, and brings
     next to nothing where each satellite has an antenna when it wants one. Where some do not it is
-    asked at prices of antennas: a linear program has them (``antenna_prices``), and where images
-    count on the ground alone steps go on from there. Four satellites and two stations come to 865
-    in place of 887 by such steps, and another four to 1,068 in place of 1,077.
+    asked at multipliers of antennas: a linear program has them (``antenna_multipliers``), and where
+    images count on the ground alone steps go on from there. Four satellites and two stations come
+    to 865 in place of 887 by such steps, and another four to 1,068 in place of 1,077.
     Otherwise the relaxation of the plan's contacts knows of recorders as well, and its
-    prices are nearly the best for all contacts.
+    multipliers are nearly the best for all contacts.
 
     Attributes
     ----------
-    prices
+    exact
         The search that has seen what they prove, once it has come to that.
     knows_antennas
-        Whether prices of antennas have lowered the bound.
+        Whether multipliers of antennas have lowered the bound.
     steps_beside
         How many steps of the search for plans take about as long as the next turn.
     """
@@ -123,7 +125,7 @@ class FleetPricing:
     def __init__(self, search: ResourceSearch) -> None:
         self._search = search
         self._paths = EnergyPaths(search.problem)
-        self.prices: PriceSearch | None = None
+        self.exact: ResourceAscent | None = None
         self.is_settled = self.knows_antennas = False
         self._work = self._steps()
         self.steps_beside = next(self._work)
@@ -132,12 +134,12 @@ class FleetPricing:
     def losses(self) -> Floats:
         """What taking each costs, about; infinite where no good plan does. Shape ``(n,)``."""
         usage = self._paths.usage
-        if self.prices is not None and self.knows_antennas:
-            usage = self.prices.usage
+        if self.exact is not None and self.knows_antennas:
+            usage = self.exact.usage
         # Those come first that most answers take.
         return np.where(usage > 0.0, 1.0 - usage / max(1.0, usage.max()), np.inf)
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Ask by energy alone some more, or relax, or prove something."""
         beside = next(self._work, None)
         self.is_settled = beside is None
@@ -146,37 +148,37 @@ class FleetPricing:
     def _steps(self) -> Iterator[int]:
         """Yield how long each turn takes, before it."""
         search, usage = self._search, self._paths.usage
-        beside_prices = TUNING.steps_beside if is_fleet(search.problem) else TUNING.tries
+        beside_ascent = TUNING.steps_beside if is_fleet(search.problem) else TUNING.tries
         energy = ascent_on_energy(
-            search.problem, self._paths, search.prices(), TUNING.epochs, search.seed
+            search.problem, self._paths, search.multipliers(), TUNING.epochs, search.seed
         )
         while not energy.is_settled:
-            yield beside_prices
+            yield beside_ascent
             # What takes opportunities counts from here on: answers come near the best plans.
             usage[:] = 0.0
             search.ask_energy(energy)
-        yield beside_prices
-        prices, _ = search.begin_prices(energy)
+        yield beside_ascent
+        ascent, _ = search.begin_ascent(energy)
         known = search.best.bound
         # Where batteries alone allow so much more than a plan earns, recorders are full:
         # multipliers that know of them prove more.
         is_far = search.best.reward < (1.0 - TUNING.tight) * energy.value
         if is_far:
-            yield from self._go_by_plan(energy, prices)
-        search.price(prices, 1)
-        self.prices = prices
-        wants_antennas = prices.wants_antennas and search.problem.counts_delivery
-        if wants_antennas and (yield from self._price_antennas(prices, known)):
-            yield from self._prove_finely(prices)
+            yield from self._go_by_plan(energy, ascent)
+        search.ascend(ascent, 1)
+        self.exact = ascent
+        wants_antennas = ascent.wants_antennas and search.problem.counts_delivery
+        if wants_antennas and (yield from self._ascend_on_antennas(ascent, known)):
+            yield from self._prove_finely(ascent)
             return
-        if not is_far and prices.value < (1.0 - TUNING.worth_a_step) * energy.value:
-            yield from self._go_by_plan(energy, prices)
-        yield beside_prices
-        search.price(prices, 1)
+        if not is_far and ascent.value < (1.0 - TUNING.worth_a_step) * energy.value:
+            yield from self._go_by_plan(energy, ascent)
+        yield beside_ascent
+        search.ascend(ascent, 1)
         if search.problem.counts_delivery:
-            yield from self._prove_finely(prices)
+            yield from self._prove_finely(ascent)
 
-    def _go_by_plan(self, energy: Ascent, prices: PriceSearch) -> Iterator[int]:
+    def _go_by_plan(self, energy: Ascent, ascent: ResourceAscent) -> Iterator[int]:
         """Have multipliers that relaxations with the plan's contacts lead to."""
         search, usage = self._search, self._paths.usage
         # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
@@ -184,91 +186,98 @@ class FleetPricing:
         is_large = bool(np.count_nonzero(usage) > TUNING.most_relaxed)
         if is_large or search.problem.turns_to_the_sun or not is_fleet(search.problem):
             return
-        for share in TUNING.price_shares[1:-1]:
+        for share in TUNING.multiplier_shares[1:-1]:
             self._ask_near(share * energy.multipliers)
         # Without cutting planes at first: that finds tasks.
         for num_rounds in range(TUNING.tries):
             yield TUNING.steps_beside
-            offered = (usage > 0.0) | (prices.usage > 0.0)
+            offered = (usage > 0.0) | (ascent.usage > 0.0)
             relaxation = search.relax_plan(offered, num_rounds)
             if relaxation is None:
                 break
-            self._ask_near(relaxation.prices)
-            prices.restart(relaxation.prices)
+            self._ask_near(relaxation.multipliers)
+            ascent.restart(relaxation.multipliers)
 
-    def _prove_finely(self, prices: PriceSearch) -> Iterator[int]:
-        """Ask the best prices once more, with more levels of the recorder."""
+    def _prove_finely(self, ascent: ResourceAscent) -> Iterator[int]:
+        """Ask the best multipliers once more, with more levels of the recorder."""
         yield TUNING.steps_beside
-        prices.count_finely(self._search.best.plan)
-        self._search.price(prices, 1)
+        ascent.count_finely(self._search.best.plan)
+        self._search.ascend(ascent, 1)
 
-    def _price_antennas(self, prices: PriceSearch, known: Bound) -> Generator[int, None, bool]:
-        """Let prices of antennas lower the bound, as long as they do; return whether they have.
+    def _ascend_on_antennas(
+        self, ascent: ResourceAscent, known: Bound
+    ) -> Generator[int, None, bool]:
+        """Let multipliers of antennas lower the bound; return whether they have.
 
         Parameters
         ----------
         known
-            A bound from before: its prices are better where recorders are shorter than batteries.
+            A bound from before: its multipliers are better where recorders are shorter than
+            batteries.
         """
-        if known.unit is not None and known.prices is not None and known.value < prices.value:
-            prices.restart(known.prices)
-        at_first = min(known.value, prices.value)
-        paid = yield from self._pay_for_volume(prices, at_first)
+        if known.unit is not None and known.multipliers is not None and known.value < ascent.value:
+            ascent.restart(known.multipliers)
+        at_first = min(known.value, ascent.value)
+        paid = yield from self._pay_for_volume(ascent, at_first)
         is_paid, at_first = paid < at_first, paid
         if not self._search.problem.objective.is_delivered:
             # Where images earn a share on board further steps gain nothing that pays for them.
             return is_paid
-        began = prices.prices, prices.antenna_prices
+        began = ascent.multipliers, ascent.antenna_multipliers
         # Steps are many, and rounding to larger units loses less than they gain.
-        unit = prices.unit
-        prices.count_in(TUNING.several * unit, moves_antennas=True)
-        prices.usage[:] = 0.0
+        unit = ascent.unit
+        ascent.count_in(TUNING.several * unit, moves_antennas=True)
+        ascent.usage[:] = 0.0
         for _ in range(TUNING.tries):
             yield 1
-            self._search.price(prices, TUNING.several)
-        if prices.value > (1.0 - TUNING.worth_a_step) * at_first:
-            is_lower = prices.value < at_first
-            prices.count_in(unit, moves_antennas=False)
+            self._search.ascend(ascent, TUNING.several)
+        if ascent.value > (1.0 - TUNING.worth_a_step) * at_first:
+            is_lower = ascent.value < at_first
+            ascent.count_in(unit, moves_antennas=False)
             if not is_lower:
-                prices.restart(*began)
+                ascent.restart(*began)
             return is_paid
         self.knows_antennas = True
-        while not prices.is_settled:
+        while not ascent.is_settled:
             yield 1
-            self._search.price(prices, TUNING.several)
+            self._search.ascend(ascent, TUNING.several)
         return True
 
-    def _pay_for_volume(self, prices: PriceSearch, at_first: float) -> Generator[int, None, float]:
-        """Ask prices at which contacts pay for all that images earn by coming down.
+    def _pay_for_volume(
+        self, ascent: ResourceAscent, at_first: float
+    ) -> Generator[int, None, float]:
+        """Ask multipliers at which contacts pay for all that images earn by coming down.
 
         Those of targets are lower by as much: by what the program says of their images, or all to
         what images earn on board. Return what the better of the two proves if that lowers the
         bound by much, and what is known if not.
         """
         search = self._search
-        began = prices.prices, prices.antenna_prices
+        began = ascent.multipliers, ascent.antenna_multipliers
         plan = search.mask(action.opportunity for action in search.best.plan.actions)
-        choices = plan, prices.latest
-        paid = antenna_prices(
-            search.problem, prices.satellites, choices, search.budget, search.seed
+        choices = plan, ascent.latest
+        paid = antenna_multipliers(
+            search.problem, ascent.satellites, choices, search.budget, search.seed
         )
         if paid is None:
             return at_first
         best = at_first * (1.0 - TUNING.worth_a_step), *began
         for share in (paid.share, search.problem.objective.collected_share):
             yield TUNING.steps_beside
-            prices.restart(share * began[0], paid.of_groups)
-            search.price(prices, 1)
+            ascent.restart(share * began[0], paid.of_groups)
+            search.ascend(ascent, 1)
             best = min(
-                best, (prices.value, prices.prices, prices.antenna_prices), key=itemgetter(0)
+                best,
+                (ascent.value, ascent.multipliers, ascent.antenna_multipliers),
+                key=itemgetter(0),
             )
-        prices.restart(*best[1:])
+        ascent.restart(*best[1:])
         return at_first if best[1] is began[0] else best[0]
 
-    def _ask_near(self, prices: Floats) -> None:
-        """Let satellites answer prices near these, by energy alone: more tasks get to be known."""
+    def _ask_near(self, multipliers: Floats) -> None:
+        """Solve by energy alone at multipliers near these, so that more tasks become known."""
         num_epochs = TUNING.many_epochs // TUNING.tries
         steps = Steps(first=TUNING.little * TUNING.first_step, last=1.0, num_epochs=num_epochs)
         search = self._search
-        ascent = Ascent(self._paths, search.problem.best_worth, prices, steps, search.seed)
+        ascent = Ascent(self._paths, search.problem.best_worth, multipliers, steps, search.seed)
         ascent.improve(num_epochs, search.budget.stop)

@@ -11,14 +11,14 @@ from functools import cached_property
 import numpy as np
 
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.lns.alternating import TurnSearch
+from planner_core.certified.lns.alternating import AlternatingSearch
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.mip.contact_sets import FixedContacts, Relaxation
 from planner_core.certified.multipliers.ascent import Ascent, Steps
 from planner_core.certified.multipliers.data import DataPaths
 from planner_core.certified.multipliers.energy import EnergyPaths, ascent_on_energy
-from planner_core.certified.multipliers.resources import PriceSearch
+from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.latency import latency_value
@@ -40,11 +40,11 @@ class ResourceSearch:
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
         # By contacts and number of tasks offered: what no plan was found to be worth.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
-        self._priced = np.inf  # the bound before it was rounded
+        self._unrounded = np.inf  # the bound before it was rounded
         self._one = self.problem.typical_worth
         self._agility_decides = False
         self._brought_down: set[Plan] = set()  # what was tried with further contacts
-        self._prices: PriceSearch | None = None
+        self._ascent: ResourceAscent | None = None
 
     @cached_property
     def unit(self) -> float:
@@ -86,22 +86,22 @@ class ResourceSearch:
         return alone.value <= (1.0 + TUNING.far_above) * self.best.bound.value
 
     @cached_property
-    def turn_search(self) -> TurnSearch:
+    def alternating_search(self) -> AlternatingSearch:
         """The search for plans of one satellite, or of few."""
-        return self.turns(self.unit)
+        return self.alternating(self.unit)
 
-    def turns(self, unit: float) -> TurnSearch:
+    def alternating(self, unit: float) -> AlternatingSearch:
         """Return a search for plans that begins at the best."""
-        return TurnSearch(self.problem, self.best.plan, unit, self.budget, self.seed)
+        return AlternatingSearch(self.problem, self.best.plan, unit, self.budget, self.seed)
 
-    def search(self, turns: TurnSearch, num_steps: int) -> bool:
+    def search(self, alternating: AlternatingSearch, num_steps: int) -> bool:
         """Search for plans from the best, while that leads on; return whether one is better."""
         before, idle_steps = self.best.reward, 0
         for _ in range(num_steps):
             if self.best.is_done or idle_steps == TUNING.several:
                 break
-            turns.turn(1)
-            is_better = turns.reward > self.best.reward and self.offer(turns.plan)
+            alternating.step(1)
+            is_better = alternating.reward > self.best.reward and self.offer(alternating.plan)
             idle_steps = 0 if is_better else idle_steps + 1
         self.best.report("plans")
         return self.best.reward > before
@@ -140,60 +140,62 @@ class ResourceSearch:
         mask[list(rows)] = True
         return mask
 
-    def price(self, prices: PriceSearch, num_steps: int) -> None:
-        """Make steps towards better prices."""
+    def ascend(self, ascent: ResourceAscent, num_steps: int) -> None:
+        """Make steps towards better multipliers."""
         for _ in range(num_steps):
             if self.best.is_done:
                 return
-            goes_on = prices.step(max(self.best.reward, self.relaxed))
-            self._priced = min(self._priced, prices.value)
-            self.best.lower(prices.bound())
+            goes_on = ascent.step(max(self.best.reward, self.relaxed))
+            self._unrounded = min(self._unrounded, ascent.value)
+            self.best.lower(ascent.bound())
             if not goes_on:
                 break
-        self.best.report("prices")
+        self.best.report("multipliers")
 
-    def prices(self) -> Floats:
-        """Return prices to begin with."""
-        known = self.best.bound.prices
+    def multipliers(self) -> Floats:
+        """Return multipliers to begin with."""
+        known = self.best.bound.multipliers
         if known is None or self.best.bound is self._first:
-            known = lagrangian_bound(self.problem, self.best.reward).prices
+            known = lagrangian_bound(self.problem, self.best.reward).multipliers
         return np.zeros(len(self.problem.target_ids)) if known is None else known
 
     @property
-    def price_search(self) -> PriceSearch:
+    def resource_ascent(self) -> ResourceAscent:
         """The search for multipliers, which begins where the battery or the recorder alone leads.
 
         To ask the battery alone takes a fiftieth of the time; where that does not lead below what
         is known by much, the exact programme is not asked at its multipliers either.
         """
-        if self._prices is not None:
-            return self._prices
+        if self._ascent is not None:
+            return self._ascent
         paths = EnergyPaths(self.problem)
-        energy = ascent_on_energy(self.problem, paths, self.prices(), TUNING.many_epochs, self.seed)
+        energy = ascent_on_energy(
+            self.problem, paths, self.multipliers(), TUNING.many_epochs, self.seed
+        )
         energy.ask()
         before = energy.value
         self.ask_energy(energy)
-        prices, value = self.begin_prices(energy)
+        ascent, value = self.begin_ascent(energy)
         if value < before - TUNING.worth_a_step * before:
-            self.price(prices, 1)
-        return prices
+            self.ascend(ascent, 1)
+        return ascent
 
-    def begin_prices(self, energy: Ascent) -> tuple[PriceSearch, float]:
+    def begin_ascent(self, energy: Ascent) -> tuple[ResourceAscent, float]:
         """Begin the search for multipliers after an ascent; return it and what is known by then.
 
         Where it has begun already it is the same.
         """
         self.prove_by_energy(energy)
         value, multipliers = self.ask_data(energy)
-        if self._prices is None:
-            self._prices = PriceSearch(
+        if self._ascent is None:
+            self._ascent = ResourceAscent(
                 self.problem, min(self.best.bound.value, value), multipliers, self.budget.stop
             )
-            self._prices.learn(self.best.plan)
-        return self._prices, value
+            self._ascent.learn(self.best.plan)
+        return self._ascent, value
 
     def ask_energy(self, energy: Ascent) -> None:
-        """Look for better prices by energy alone, for a while."""
+        """Look for better multipliers by energy alone, for a while."""
         energy.improve(TUNING.many_epochs, self.budget.stop)
 
     def ask_data(self, energy: Ascent) -> tuple[float, Floats]:
@@ -208,7 +210,7 @@ class ResourceSearch:
         if paths is None:
             return known
         steps = Steps(first=TUNING.first_step, last=TUNING.last_step, num_epochs=TUNING.many_epochs)
-        data = Ascent(paths, self.problem.best_worth, self.prices(), steps, self.seed)
+        data = Ascent(paths, self.problem.best_worth, self.multipliers(), steps, self.seed)
         data.ask()
         if data.value > (1.0 + TUNING.far_above) * energy.value:
             return known  # energy decides
@@ -224,23 +226,27 @@ class ResourceSearch:
         """
         # With turns to the sun answers are estimates.
         if energy.value < self.best.bound.value and not self.problem.turns_to_the_sun:
-            prices = energy.multipliers
+            multipliers = energy.multipliers
             none = np.zeros(np.count_nonzero(self.problem.opportunities.kind == CONTACT))
-            value = latency_value(self.problem, prices, none)
-            self.best.lower(Bound(value=value, proof="dp", prices=prices, contact_prices=none))
+            value = latency_value(self.problem, multipliers, none)
+            self.best.lower(
+                Bound(value=value, proof="dp", multipliers=multipliers, contact_multipliers=none)
+            )
 
-    def relax_sets(self, prices: PriceSearch, turns: TurnSearch) -> bool:
-        """Learn prices from the relaxations of sets of contacts; return whether any is new."""
+    def relax_sets(self, ascent: ResourceAscent, alternating: AlternatingSearch) -> bool:
+        """Learn multipliers from the relaxations of sets of contacts; return whether any is new."""
         table = self.problem.opportunities
-        plans = [self.mask(a.opportunity for a in p.actions) for p in (self.best.plan, turns.plan)]
+        plans = [
+            self.mask(a.opportunity for a in p.actions) for p in (self.best.plan, alternating.plan)
+        ]
         sets = [
             *(tuple(np.flatnonzero(p & (table.kind == CONTACT)).tolist()) for p in plans),
-            *(key for key, _ in prices.contact_sets.most_common()),
+            *(key for key, _ in ascent.contact_sets.most_common()),
         ]
         new = [key for key in dict.fromkeys(sets) if key not in self._relaxed][: TUNING.tries]
         offered = np.ones(len(table), dtype=np.bool_)
         if is_large(self.problem):
-            offered = (prices.usage > 0.0) | (turns.usage > 0.0)
+            offered = (ascent.usage > 0.0) | (alternating.usage > 0.0)
         offered |= self.mask(action.opportunity for action in self.best.plan.actions)
         for contacts in new:
             if self.best.is_done:
@@ -250,8 +256,8 @@ class ResourceSearch:
         if not new or not np.isfinite(self.relaxed):
             return False
         least = self.relaxed - TUNING.room * self._one
-        near = [r.prices for r in self._relaxed.values() if r.value >= least]
-        prices.restart(np.mean(near, axis=0))
+        near = [r.multipliers for r in self._relaxed.values() if r.value >= least]
+        ascent.restart(np.mean(near, axis=0))
         self.best.report("contacts fixed")
         return True
 
@@ -296,14 +302,14 @@ class ResourceSearch:
         """Search for a better plan with the most promising contacts; return whether it is.
 
         Where a relaxation leaves little room above a better plan that takes long. Unless this
-        is the last resort it waits for prices, which may show that there is none.
+        is the last resort it waits for multipliers, which may show that there is none.
 
         Parameters
         ----------
         is_rounded
             Whether to look only near the relaxation.
         """
-        can_sink = self._priced - self.relaxed > TUNING.tight * self._one
+        can_sink = self._unrounded - self.relaxed > TUNING.tight * self._one
         room = TUNING.room if can_sink and not is_last else 0.0
         sizes = TUNING.open_tasks, int(TUNING.more * TUNING.open_tasks)
         hopeful = [
@@ -343,5 +349,5 @@ class ResourceSearch:
 
     @property
     def relaxed(self) -> float:
-        """What the best relaxation with fixed contacts is worth: prices hardly get below."""
+        """What the best relaxation with fixed contacts is worth: multipliers hardly get below."""
         return max((r.value for r in self._relaxed.values()), default=-np.inf)

@@ -1,10 +1,10 @@
 """With battery and recorder, one satellite or few: plans and bounds by exact programmes.
 
-Where energy is short the programme without prices bounds the best plan within an image or two,
-and the same programme over choices of tasks finds one. Where targets are few as well, prices
-lower the bound. The relaxations of promising sets of contacts tell prices and, for each set, the
-few tasks that make a small mixed-integer program. Where agility alone decides, so does the proof
-without resources.
+Where energy is short the programme without multipliers bounds the best plan within an image or two,
+and the same programme over choices of tasks finds one. Where targets are few as well, multipliers
+lower the bound. The relaxations of promising sets of contacts tell multipliers and, for each set,
+the few tasks that make a small mixed-integer program. Where agility alone decides, so does the
+proof without resources.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def windows_and_choices(search: Search) -> Iterator[None]:
         if best.reward > known:
             # Programs leave room for windows: under clouds 231.9 for 231.6, with rewards of 1 to
             # 10 2,505 for 2,499 of 2,534 after 20 CPU seconds.
-            engine.turn_search.adopt(best.plan)
-        engine.search(engine.turn_search, TUNING.rounds)
+            engine.alternating_search.adopt(best.plan)
+        engine.search(engine.alternating_search, TUNING.rounds)
         known = best.reward
         yield
 
@@ -104,10 +104,10 @@ def whole_relaxation(search: Search) -> Iterator[None]:
 def multipliers(search: Search) -> Iterator[None]:
     """Lower the bound by multipliers of targets."""
     engine = search.engine(ResourceSearch)
-    prices = engine.price_search
+    multipliers = engine.resource_ascent
     yield
     while search.is_promising:
-        engine.price(prices, TUNING.tries)
+        engine.ascend(multipliers, TUNING.tries)
         yield
 
 
@@ -115,10 +115,10 @@ def programs(search: Search) -> Iterator[None]:
     """Relax sets of contacts, and look for better plans by small programs with one of them."""
     engine = search.engine(ResourceSearch)
     while search.is_promising:
-        is_new = engine.relax_sets(engine.price_search, engine.turn_search)
+        is_new = engine.relax_sets(engine.resource_ascent, engine.alternating_search)
         if is_new:
             # How low the bound gets by them says which sets are worth a program.
-            engine.price(engine.price_search, TUNING.tries)
+            engine.ascend(engine.resource_ascent, TUNING.tries)
         if not engine.fix_contacts(is_last=False) and not is_new:
             engine.fix_contacts(is_last=True)
         yield

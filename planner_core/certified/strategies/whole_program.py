@@ -16,7 +16,7 @@ from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.lns.search import improved
-from planner_core.certified.mip.clique_cuts import violated_antichains
+from planner_core.certified.mip.clique_cuts import violated_cliques
 from planner_core.certified.mip.highs import Engine, Outcome, Watch
 from planner_core.certified.mip.model import Formulation, PlanProgram, plan_program
 from planner_core.certified.mip.program import Rows
@@ -156,7 +156,7 @@ def _starts(problem: Problem, budget: Budget) -> list[Plan]:
 
 
 def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watch: Watch) -> None:
-    """Add the antichains that the fractional optimum breaks, while that leads anywhere."""
+    """Add the cliques that the fractional optimum breaks, while that leads anywhere."""
     bounds: list[float] = []
     for _ in range(rounds):
         taken = engine.relaxed()
@@ -170,7 +170,7 @@ def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watc
         num_added = 0
         for satellite, precedence in zip(problem.satellites, model.precedences, strict=True):
             own = model.taken[satellite.rows]
-            offsets, members = violated_antichains(precedence, taken[own])
+            offsets, members = violated_cliques(precedence, taken[own])
             engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
             num_added += len(offsets) - 1
         if num_added == 0:

@@ -1,9 +1,9 @@
-"""Prices of antennas at which contacts pay for what they bring down, from a linear program.
+"""Multipliers of antennas at which contacts pay for what they bring down, from a linear program.
 
 Where stations cannot serve all satellites, what a fleet brings down is limited by how long an
-antenna serves any of them. The subgradient steps of ``PriceSearch`` find that slowly: a satellite
-that pays for one contact takes another. The program knows all contacts at once, and nothing of
-energy or agility: those are for the exact programmes to say.
+antenna serves any of them. The subgradient steps of ``ResourceAscent`` find that slowly: a
+satellite that pays for one contact takes another. The program knows all contacts at once, and
+nothing of energy or agility: those are for the exact programmes to say.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from planner_core.problem import COLLECT, Bools, Floats, Ints, Problem
 from planner_core.problem.delivery import lost_on_board
 
 
-class AntennaPrices(NamedTuple):
+class AntennaMultipliers(NamedTuple):
     """What the program says that antennas and images are worth.
 
     Attributes
     ----------
     of_groups
-        Prices of places in ``antenna_groups``. Shape ``(num_groups,)``.
+        Multipliers of places in ``antenna_groups``. Shape ``(num_groups,)``.
     share
         What the images of a target earn in the mean once they have paid for coming down. Shape
         ``(num_targets,)``.
@@ -79,13 +79,13 @@ class _Downlink:
         return np.append(worth, 0.0)[first[after]] * self.size
 
 
-def antenna_prices(
+def antenna_multipliers(
     problem: Problem,
     satellites: Sequence[SatelliteRelaxation],
     choices: Sequence[Bools],
     budget: Budget,
     seed: int,
-) -> AntennaPrices | None:
+) -> AntennaMultipliers | None:
     """Return the duals of a fleet's downlink: contacts in part, each after what it brings down.
 
     Parameters
@@ -111,7 +111,7 @@ def antenna_prices(
     engine = Engine(_program(problem, downlinks), budget, seed, is_chained=False)
     if engine.relaxed() is None:
         return None
-    worth = engine.row_prices * (lost / recorded)
+    worth = engine.row_duals * (lost / recorded)
     if not worth[: len(groups)].any():
         return None
     paid = np.zeros(len(problem.opportunities))
@@ -119,7 +119,7 @@ def antenna_prices(
     for one in downlinks:
         paid[one.own] = one.paid_for(worth[first : first + len(one.rows)])
         first += len(one.rows)
-    return AntennaPrices(worth[: len(groups)], _shares(problem, paid))
+    return AntennaMultipliers(worth[: len(groups)], _shares(problem, paid))
 
 
 def _program(problem: Problem, downlinks: Sequence[_Downlink]) -> Program:
@@ -152,8 +152,8 @@ def _shares(problem: Problem, paid: Floats) -> Floats:
     rows = np.flatnonzero((table.kind == COLLECT) & (problem.worth > 0.0))
     left = problem.worth - np.maximum(lost_on_board(problem) - paid, 0.0)
     num_targets = len(problem.target_ids)
-    count = np.bincount(table.place[rows], minlength=num_targets)
+    count = np.bincount(table.site[rows], minlength=num_targets)
     total = np.bincount(
-        table.place[rows], weights=left[rows] / problem.worth[rows], minlength=num_targets
+        table.site[rows], weights=left[rows] / problem.worth[rows], minlength=num_targets
     )
     return np.where(count > 0, total / np.maximum(count, 1), 1.0)

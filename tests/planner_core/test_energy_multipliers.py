@@ -1,4 +1,4 @@
-"""Bounds by energy alone: the programme is the best of all paths, and no plan beats the prices."""
+"""Bounds by energy alone: the programme finds the best path, and no plan beats the bound."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def test_what_batteries_alone_prove_bounds_all_plans(
     search.prove_by_energy(energy)
     bound = search.best.bound
     assert bound.value >= best_reward(problem) - 1e-9
-    if bound.contact_prices is not None:
-        assert not bound.contact_prices.any()
+    if bound.contact_multipliers is not None:
+        assert not bound.contact_multipliers.any()
         assert bound.value <= rounded_bound(problem, energy.value, 0.0) + 1e-6
         assert is_proven(problem, from_json(to_json(bound)))
         if bound.value > 0.1:
@@ -105,7 +105,7 @@ def test_the_programme_finds_the_best_path(dynamics: Dynamics, seed: int, per_co
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @examples(150)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
-def test_no_plan_beats_the_prices(dynamics: Dynamics, seed: int, num_satellites: int) -> None:
+def test_no_plan_beats_the_multipliers(dynamics: Dynamics, seed: int, num_satellites: int) -> None:
     problem = _problem(seed, dynamics, num_satellites)
     search = ascent(problem, 30, seed)
     search.improve(30, Budget().stop)
@@ -125,7 +125,7 @@ def test_collects_that_cost_next_to_nothing_need_no_endless_table() -> None:
     assert search.value >= replay(free, Certified().solve(free, Budget(), 0).plan).reward - 1e-6
 
 
-def test_prices_lower_what_satellites_gain_that_share_targets() -> None:
+def test_multipliers_lower_what_satellites_gain_that_share_targets() -> None:
     problem = random_problem(
         1, num_collects=120, num_targets=30, num_contacts=6, num_satellites=3, span_s=3000.0
     )

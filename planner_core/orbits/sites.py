@@ -1,4 +1,4 @@
-"""Places on the ground, and how a satellite is seen from them (and they from it)."""
+"""Sites on the ground, and how a satellite is seen from them (and they from it)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _Point(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Places:
+class Sites:
     """Points on the ground with their geodetic horizon, Earth-fixed. Shape ``(n, 3)`` each."""
 
     position_m: Floats
@@ -41,7 +41,7 @@ class Places:
     lon_deg: Floats
 
     @classmethod
-    def of(cls, points: Sequence[_Point]) -> Places:
+    def of(cls, points: Sequence[_Point]) -> Sites:
         """Return the places of targets or stations, in their order."""
         lon, lat, alt = (
             np.array([getattr(point, name) for point in points], dtype=np.float64)
@@ -54,9 +54,9 @@ class Places:
     def __len__(self) -> int:
         return len(self.position_m)
 
-    def at(self, rows: npt.NDArray[np.integer]) -> Places:
+    def at(self, rows: npt.NDArray[np.integer]) -> Sites:
         """Return the places in these rows (repeats allowed)."""
-        return Places(
+        return Sites(
             position_m=self.position_m.take(rows, axis=0),
             up=self.up.take(rows, axis=0),
             east=self.east.take(rows, axis=0),
@@ -85,56 +85,54 @@ class View:
     in_eclipse: Bools
 
 
-def view(ephemeris: Ephemeris, places: Places, t_s: Floats, nadir: Nadir) -> View:
+def view(ephemeris: Ephemeris, sites: Sites, t_s: Floats, nadir: Nadir) -> View:
     """Return the geometry of row ``i``'s place at ``t_s[i]``. Shape ``(n,)``."""
     position, _ = ephemeris.state_itrf(t_s)
     vertical = frames.geodetic_normal(position) if nadir == "geodetic" else frames.unit(position)
-    sight = position - places.position_m
+    sight = position - sites.position_m
     range_m = np.sqrt(_row_dot(sight, sight))
-    azimuth, elevation = _azimuth_elevation_deg(sight, places)
+    azimuth, elevation = _azimuth_elevation_deg(sight, sites)
     sun = ephemeris.sun_itrf(t_s)
     return View(
         off_nadir_deg=_angle_deg(_row_dot(vertical, sight) / range_m),
         elevation_deg=elevation,
         azimuth_deg=azimuth,
         range_m=range_m,
-        sun_elevation_deg=90.0 - _angle_deg(_row_dot(places.up, sun)),
+        sun_elevation_deg=90.0 - _angle_deg(_row_dot(sites.up, sun)),
         in_eclipse=is_in_shadow(position, sun),
     )
 
 
-def azimuth_elevation_deg(
-    ephemeris: Ephemeris, places: Places, t_s: Floats
-) -> tuple[Floats, Floats]:
-    """Return where the satellite stands above each place: azimuth [0, 360) and elevation."""
+def azimuth_elevation_deg(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> tuple[Floats, Floats]:
+    """Return where the satellite stands above each site: azimuth [0, 360) and elevation."""
     position, _ = ephemeris.state_itrf(t_s)
-    return _azimuth_elevation_deg(position - places.position_m, places)
+    return _azimuth_elevation_deg(position - sites.position_m, sites)
 
 
-def elevations_deg(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
-    """Return how high the satellite stands above each place."""
+def elevations_deg(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> Floats:
+    """Return how high the satellite stands above each site."""
     position, _ = ephemeris.state_itrf(t_s)
-    east, north, up = _east_north_up(position - places.position_m, places)
+    east, north, up = _east_north_up(position - sites.position_m, sites)
     return np.degrees(np.arctan2(up, np.hypot(east, north)))
 
 
-def _azimuth_elevation_deg(sight: Floats, places: Places) -> tuple[Floats, Floats]:
-    east, north, up = _east_north_up(sight, places)
+def _azimuth_elevation_deg(sight: Floats, sites: Sites) -> tuple[Floats, Floats]:
+    east, north, up = _east_north_up(sight, sites)
     azimuth = np.degrees(np.arctan2(east, north)) % 360.0
     return azimuth, np.degrees(np.arctan2(up, np.hypot(east, north)))
 
 
-def _east_north_up(sight: Floats, places: Places) -> tuple[Floats, Floats, Floats]:
-    return _row_dot(sight, places.east), _row_dot(sight, places.north), _row_dot(sight, places.up)
+def _east_north_up(sight: Floats, sites: Sites) -> tuple[Floats, Floats, Floats]:
+    return _row_dot(sight, sites.east), _row_dot(sight, sites.north), _row_dot(sight, sites.up)
 
 
-def line_of_sight_teme(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
+def line_of_sight_teme(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> Floats:
     """Return unit vectors from the satellite to row ``i``'s place, inertial. ``(n, 3)``."""
     position, _ = ephemeris.state_itrf(t_s)
-    return ephemeris.to_teme(frames.unit(places.position_m - position), t_s)
+    return ephemeris.to_teme(frames.unit(sites.position_m - position), t_s)
 
 
-def los_rate_deg_s(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
+def los_rate_deg_s(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> Floats:
     """Return how the lines of sight turn, in deg/s and inertial axes. Shape ``(n, 3)``.
 
     The rotation from half a second before to half a second after, as far as the horizon goes. Only
@@ -142,8 +140,8 @@ def los_rate_deg_s(ephemeris: Ephemeris, places: Places, t_s: Floats) -> Floats:
     """
     before_s = np.maximum(t_s - _HALF_STEP_S, 0.0)
     after_s = np.minimum(t_s + _HALF_STEP_S, ephemeris.duration_s)
-    before = line_of_sight_teme(ephemeris, places, before_s)
-    after = line_of_sight_teme(ephemeris, places, after_s)
+    before = line_of_sight_teme(ephemeris, sites, before_s)
+    after = line_of_sight_teme(ephemeris, sites, after_s)
     # So small an angle is its sine.
     turned = np.degrees(np.cross(before, after))
     return np.asarray(turned / (after_s - before_s)[:, None])

@@ -1,4 +1,4 @@
-"""Places on the ground: what is to be imaged, and what takes data down."""
+"""Sites on the ground: what is to be imaged, and what takes data down."""
 
 from __future__ import annotations
 
