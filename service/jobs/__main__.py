@@ -1,4 +1,4 @@
-"""``python -m service.jobs``: one worker process, as the supervisor starts it."""
+"""``python -m service.jobs``: one worker process, as started by the supervisor."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
-    """Run a worker until SIGTERM, or until the process ``--supervisor`` is gone."""
+    """Run a worker until SIGTERM, or until the ``--supervisor`` process is gone."""
     parser = argparse.ArgumentParser(prog="python -m service.jobs")
     parser.add_argument("--work", default=Work().function, help="module:function")
     parser.add_argument("--preload", default=Work().preload, help="module")
@@ -37,7 +37,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
 
 
 def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None) -> NoReturn:
-    """Run one worker in this process, which ends with it; this must be its main thread."""
+    """Run one worker in this process's main thread, then exit the process."""
     configure_logging()
     spans = start_tracing(settings, "worker")
     worker = Worker(settings, work)
@@ -53,11 +53,11 @@ def run_worker(settings: Settings, work: Work, *, supervisor: int | None = None)
     except Exception:
         log.exception("the worker failed")
         status = 1
-    # Some thread of the queue's library may yet try to reach a database that hangs, to write
-    # what we do not need: it would hold up an ordinary exit for minutes.
+    # A thread of the queue's library may still be trying to write to a database that hangs. The
+    # data is not needed, and an ordinary exit would wait for that thread for minutes.
     if spans is not None:
         spans.shutdown()
-    # The folder of the fork server's socket is removed here, among other things.
+    # Exit handlers clean up, for example the folder of the fork server's socket.
     atexit._run_exitfuncs()
     os._exit(status)
 

@@ -1,7 +1,7 @@
 """The solver's process: what happens between fork and exit.
 
-It talks to its worker over one pipe: ``CANCEL`` comes in, progress, the blocks of
-an answer and at last one ending go out. When the worker's end closes, the process is gone at once.
+It talks to its worker over one pipe: ``CANCEL`` comes in; progress, the blocks of an answer and
+finally one ending go out. If the worker's end closes, the process exits at once.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ log = logging.getLogger(__name__)
 REPORT_EVERY_S: Final = 0.1
 
 CANCEL: Final = "cancel"
-"""All that the worker may say."""
+"""The only command that the worker sends."""
 
 WorkFunction = Callable[[PlanRequest, Budget], PlanAnswer]
 
 
 @dataclass(frozen=True, slots=True)
 class Started:
-    """The first word: the kernels are loaded and the clock runs."""
+    """The first message: the kernels are loaded and the clock runs."""
 
 
 @dataclass(frozen=True, slots=True)
 class OpportunitiesFollow:
-    """The next message is the answer's opportunity block, as bytes."""
+    """The next message is the answer's opportunity block, as raw bytes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """The work is done, or was cut short and has a plan all the same."""
+    """The work is done, or was cut short but still has a plan."""
 
     answer: PlanAnswer
 
@@ -79,7 +79,7 @@ def main(
     work
         The work function as ``"module:function"``.
     time_s, num_threads
-        Its budget.
+        The budget.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_parent(signal.SIGKILL)
@@ -89,7 +89,7 @@ def main(
     threading.Thread(target=_obey, args=(connection, budget), daemon=True).start()
     ending = _do(load(work), request, budget)
     if isinstance(ending, Answered):
-        # In pieces, so that neither side holds the answer as a message too.
+        # In pieces, so that neither side also holds the whole answer as one message.
         answer = ending.answer
         for block in answer.blocks:
             outbox.send(block)
@@ -120,7 +120,7 @@ def _do(work: WorkFunction, request: PlanRequest, budget: Budget) -> Ending:
 
 
 class _Outbox:
-    """The sending side: reports at most every ``REPORT_EVERY_S``, from any thread."""
+    """The sending side: at most one report per ``REPORT_EVERY_S`` and phase, from any thread."""
 
     def __init__(self, connection: Connection[Any, Any]):
         self._connection = connection
@@ -150,7 +150,7 @@ def _obey(connection: Connection[Any, Any], budget: Budget) -> None:
         try:
             command = connection.recv()
         except (EOFError, OSError):
-            # Nobody waits for an answer. Threads and kernels would delay a polite exit.
+            # Nobody waits for an answer. An orderly exit would wait for threads and kernels.
             os._exit(1)
         if command == CANCEL:
             budget.cancel()

@@ -1,4 +1,4 @@
-"""The line that tells how far compilation is."""
+"""The output line that shows the progress of compilation."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import Final, TextIO
 
 from planner_core.jit import compiled_kernels, stored_signatures
 
-_EVERY_S: Final = 10.0  # where lines cannot be overwritten
-_TOO_FEW: Final = 0.1  # share of the kernels from which no time can be told yet
+_EVERY_S: Final = 10.0  # if lines cannot be overwritten
+_TOO_FEW: Final = 0.1  # below this share of the kernels, the time left cannot be estimated yet
 
 
 class CompilationLine:
-    """Counts kernels by their source lines, which is about what they take to compile.
+    """Measures progress in source lines of kernels, roughly proportional to compile time.
 
-    Nothing is printed before the first kernel: where all are on disk, there is nothing to tell.
+    Nothing is printed before the first kernel is compiled: if all are on disk, there is no need.
 
     Parameters
     ----------
     share
-        How much of the lines of all kernels is to be compiled, or is on disk already.
+        Share of the source lines of all kernels to be compiled now or already on disk.
     """
 
     def __init__(self, began_s: float, share: float = 1.0, out: TextIO = sys.stdout) -> None:
@@ -47,7 +47,7 @@ class CompilationLine:
         self._done += self._left.pop(name, 0)
 
     def show(self) -> None:
-        """Print how far it is: always in a terminal, now and then elsewhere."""
+        """Print the progress: continually in a terminal, now and then elsewhere."""
         now_s = time.monotonic()
         every_s = 0.5 if self._is_terminal else _EVERY_S
         if self._done < _TOO_FEW * self._total or now_s - self._shown_s < every_s:
@@ -62,7 +62,7 @@ class CompilationLine:
             self._print(text)
 
     def end(self) -> None:
-        """Say how long it took."""
+        """Print how long it took."""
         if self._done:
             begin = "\r" if self._is_terminal else ""
             took_s = time.monotonic() - self._began_s

@@ -1,4 +1,4 @@
-"""Whether the planning kernels are compiled, told without importing any."""
+"""Whether the planning kernels are compiled, found out without importing any."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Name = Literal["all", "demonstration"]
 
 
 def is_ready(name: Name) -> bool:
-    """Return whether they were compiled from the sources as they are now, to the letter."""
+    """Return whether they were compiled from exactly the present sources."""
     return _noted(name)[1:] == [_sources()]
 
 
 def stamps(name: Name) -> str | None:
-    """Return what was noted of the kernels when they were compiled last; None for nothing."""
+    """Return the stamps noted when the kernels were last compiled; None if there are none."""
     noted = _noted(name)
     return noted[0] if noted else None
 
@@ -30,9 +30,9 @@ def note(name: Name, stamps: str) -> None:
     Parameters
     ----------
     stamps
-        What decides all that is compiled (``planner_core.jit.all_stamps``).
+        Everything that decides what is compiled (``planner_core.jit.all_stamps``).
     """
-    with suppress(OSError):  # nowhere to write: the next one looks again
+    with suppress(OSError):  # not writable: the next process checks again
         kernel_folder().mkdir(parents=True, exist_ok=True)
         _marker(name).write_text(f"{stamps}\n{_sources()}\n")
 

@@ -1,8 +1,8 @@
-"""What a worker holds of the scenarios it has planned, for the plans that follow.
+"""A worker's own copy of the opportunities of scenarios it has planned, for the next plans.
 
-A replan's opportunities are those of the plan before, but for new targets. Every worker can read
-them from the database; the one that made them has them in a folder of its own, where no database
-and no decompression stand between. Nothing but time depends on it.
+A replan has the opportunities of its parent plan, except for new targets. Every worker can read
+those from the database; the worker that computed them also has them in a folder of its own, where
+it needs neither the database nor decompression. Only speed depends on it.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from typing import Final
 import psutil
 
 MOST_BYTES: Final = 512 * 2**20
-"""In a folder: those of 24 satellites and 10,000 targets take 60 MB."""
+"""Per folder; the opportunities of 24 satellites and 10,000 targets take 60 MB."""
 _PREFIX: Final = "slewline-held-"
 
 
 class HeldBlocks:
-    """Blocks of opportunities by the hash of their scenario, in files; the longest unused go first.
+    """Files of opportunity blocks, named by scenario hash; the least recently used go first.
 
     Parameters
     ----------
     folder
-        Of one worker: its jobs write there one after another.
+        Used by one worker only, whose jobs write there one after another.
     """
 
     def __init__(self, folder: Path, most_bytes: int = MOST_BYTES) -> None:
         self._folder, self._most_bytes = folder, most_bytes
 
     def load(self, sha256: str) -> bytes | None:
-        """Return what is held of a scenario, or None."""
+        """Return the block held for a scenario, or None."""
         path = self._path(sha256)
         try:
             block = path.read_bytes()
@@ -44,16 +44,16 @@ class HeldBlocks:
         return block
 
     def holds(self, sha256: str) -> bool:
-        """Return whether something is held of a scenario."""
+        """Return whether a block is held for a scenario."""
         return self._path(sha256).exists()
 
     def save(self, sha256: str, block: bytes) -> None:
-        """Hold a block, where there is room. A disk that is full is no fault."""
+        """Hold a block if there is room. A full disk is not an error."""
         if len(block) > self._most_bytes:
             return
         with contextlib.suppress(OSError):
             self._make_room(len(block))
-            # A job that is killed here leaves no half of a file under the name.
+            # Write to another name first: a job killed here must not leave half a file.
             number, name = tempfile.mkstemp(dir=self._folder)
             with open(number, "wb") as file:
                 file.write(block)
@@ -74,9 +74,9 @@ class HeldBlocks:
 
 
 def make_folder() -> Path | None:
-    """Return a new folder of this process; None where there is no place for one.
+    """Return a new folder for this process, or None if none can be made.
 
-    Those of processes that were killed are removed.
+    Removes the folders of processes that were killed.
     """
     root = Path(tempfile.gettempdir())
     for folder in root.glob(f"{_PREFIX}*"):

@@ -1,8 +1,8 @@
 """A job's life: start, renew, finish, hand back, cancel.
 
-Every change is one guarded update on the job's row. ``run`` is the fencing token: only the
-holder of the current run can renew or finish, however late a worker wakes up. All times are
-the database's.
+Every change is one guarded update of the job's row. ``run`` is the fencing token: only the
+holder of the current run can renew or finish, however late a worker wakes up. All times come
+from the database's clock.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class Lease:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended. ``blocks`` hold the documents of its answer; none where it has no answer.
+    """How a run ended. ``blocks`` hold the documents of its answer, if it has one.
 
-    ``progress`` is the last report; None leaves the one that the job has. ``figures`` are the
-    timeline's numbers for tables, ``warnings`` what it says to people. ``num_shared_bytes`` are
-    stored for all jobs of the scenario.
+    ``progress`` is the last report; None keeps the job's. ``figures`` are the timeline's numbers
+    for tables, ``warnings`` its messages for people. ``num_shared_bytes`` counts the data stored
+    for all jobs of the scenario.
     """
 
     state: JobState
@@ -57,14 +57,14 @@ class Outcome:
 
     @classmethod
     def failed(cls, code: str, detail: str) -> Outcome:
-        """Return the end of a job that could not be done."""
+        """Return the outcome of a job that could not be done."""
         return cls(state="failed", error={"code": code, "detail": detail})
 
 
 def start(session: Session, job_id: str, dispatch: int, *, lease_s: float) -> Lease | None:
-    """Begin a run, or return None where this dispatch has nothing to do any more.
+    """Begin a run, or return None if this dispatch is obsolete.
 
-    A job that still says ``running`` may be started only once its lease has lapsed.
+    A job in state ``running`` may be started again only after its lease has lapsed.
     """
     may_start = sa.or_(
         JobRow.state == "queued",
@@ -93,11 +93,11 @@ def renew(
     Parameters
     ----------
     progress
-        The newest report, or None where there is nothing new.
+        The newest report, or None if there is nothing new.
 
     Returns
     -------
-    The job's state (``running`` or ``cancelling``), or None where the lease is lost.
+    The job's state (``running`` or ``cancelling``), or None if the lease is lost.
     """
     changes: dict[str, Any] = {"lease_until": utc_now(lease_s)}
     if progress is not None:
@@ -107,9 +107,9 @@ def renew(
 
 
 def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
-    """Write how the job ended, result included; return False where the lease is lost.
+    """Write how the job ended, with its result; return False if the lease is lost.
 
-    Who cancelled a job is told that it was cancelled, even where its plan came first.
+    A job that is being cancelled ends as cancelled, even if its plan is ready first.
     """
     state: Any = outcome.state
     if state == "succeeded":
@@ -135,7 +135,7 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
 
 
 def _adopt_replan(session: Session, job_id: str) -> None:
-    """Make a draft of the plan of a job that replans another one."""
+    """If the job is a replan, make a draft of its plan."""
     job = session.get_one(JobRow, job_id, populate_existing=True)
     text = answer_store.timeline_of(session, job_id) if replans.is_replan(job.change) else None
     if text is not None:
@@ -151,12 +151,12 @@ def hand_back(session: Session, queue: JobQueue, lease: Lease) -> None:
 
 
 def let_go(session: Session, lease: Lease) -> None:
-    """Let a lease end now: whoever looks next finds a lost run."""
+    """Let a lease lapse now, so that the next reconciler finds a lost run."""
     _update(session, _held(lease), lease_until=utc_now())
 
 
 def return_unstarted(session: Session, queue: JobQueue, job_id: str, dispatch: int) -> bool:
-    """Put a job back whose dispatch was taken from the queue but will never start it."""
+    """Put back a job whose dispatch was taken from the queue but will never be started."""
     waiting = sa.and_(JobRow.dispatch == dispatch, JobRow.state == "queued")
     return redispatch(session, queue, waiting, job_id)
 
@@ -164,7 +164,7 @@ def return_unstarted(session: Session, queue: JobQueue, job_id: str, dispatch: i
 def redispatch(
     session: Session, queue: JobQueue, guard: sa.ColumnElement[bool], job_id: str, **changes: Any
 ) -> bool:
-    """Queue a job anew under its next dispatch number, if ``guard`` still holds."""
+    """Queue a job again under its next dispatch number, if ``guard`` still holds."""
     found = changed(
         session,
         JobRow,
@@ -186,11 +186,11 @@ def redispatch(
 
 
 def request_cancel(session: Session, job_id: str) -> bool:
-    """Cancel a job: at once where it waits, else by asking its worker.
+    """Cancel a job: at once if it is queued, otherwise by asking its worker.
 
     Returns
     -------
-    Whether the job was active; asking twice is no mistake.
+    Whether the job was active, which includes a job that is already being cancelled.
     """
     if end(session, job_id, JobRow.state == "queued", state="cancelled", cancel_requested=True):
         return True
@@ -210,7 +210,7 @@ def _held(lease: Lease) -> sa.ColumnElement[bool]:
 
 
 def end(session: Session, job_id: str, guard: sa.ColumnElement[bool], **values: Any) -> bool:
-    """Give a job its final state, if ``guard`` still holds; who waits for it will be told."""
+    """Give a job its final state if ``guard`` still holds, and queue its webhook deliveries."""
     ended = {"finished_at": utc_now(), "lease_until": None, "version": JobRow.version + 1}
     if not _update(session, guard & (JobRow.id == job_id), **ended, **values):
         return False

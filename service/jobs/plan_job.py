@@ -30,9 +30,9 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
     Raises
     ------
     PlannerError
-        Where the scenario or the solver's parameters are wrong.
+        If the scenario or the solver's parameters are wrong.
     Cancelled
-        Where the budget ended before there was any plan.
+        If the budget ends before there is any plan.
     """
     make_solver = cast(Callable[..., Solver], solver_class(request.solver))
     block = request.opportunity_block.take()
@@ -72,7 +72,7 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
 
 
 def _before(request: PlanRequest, held: HeldBlocks | None) -> PlanBefore | None:
-    """Return what is known of the plan that a replan goes on from: held here, or stored."""
+    """Return what is known of a replan's parent plan, with opportunities held here or stored."""
     parent = request.parent
     if parent is None:
         return None
@@ -90,7 +90,7 @@ def _before(request: PlanRequest, held: HeldBlocks | None) -> PlanBefore | None:
 
 
 def _satellites(documents: Documents) -> Iterator[tuple[Json, Iterator[Json], Json]]:
-    """Yield what stands before the actions of each satellite, those, and what stands behind."""
+    """Yield for each satellite the fields before its actions, the actions, and the fields after."""
     for about, actions in documents.satellites():
         before, behind = {"id", "name"}, {"on_board", "totals", "eclipses", "resources"}
         yield dumped(about, include=before), map(dumped, actions), dumped(about, include=behind)

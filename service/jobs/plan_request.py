@@ -1,6 +1,6 @@
-"""What travels between a worker and the process that plans: the question, and its answer.
+"""What travels between a worker and the process that plans: a request and its answer.
 
-Nothing here needs the planner, so that a worker starts without it.
+Nothing here needs the planner, so that a worker can start without it.
 """
 
 from __future__ import annotations
@@ -13,27 +13,27 @@ from service.answers.blocks import Block, targets_text, timeline_text
 
 
 class Parcel:
-    """Bytes that are handed on once: who takes them is alone in holding them."""
+    """Bytes that are handed on once, so that only the taker keeps them in memory."""
 
     def __init__(self, content: bytes | None):
         self._content = content
 
     def take(self) -> bytes | None:
-        """Return the bytes the first time; None where there are none, or no longer."""
+        """Return the bytes the first time; None if there are none or they were taken."""
         content, self._content = self._content, None
         return content
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parent:
-    """The plan that a replan goes on from, as its own job has stored it.
+    """The parent plan of a replan, as stored by its own job.
 
     Attributes
     ----------
     content, bound, opportunity_block
-        As those of a request.
+        As in ``PlanRequest``.
     imaged
-        The targets that it images.
+        The ids of the targets that it images.
     """
 
     scenario_sha256: str
@@ -45,26 +45,26 @@ class Parent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanRequest:
-    """The frozen question of one job, as it travels to the solver's process.
+    """What one job is to do, as sent to the solver's process.
 
     Attributes
     ----------
     run
-        Which run of the job this is, from 1.
+        The number of this run of the job, from 1.
     content
         The canonical scenario file (JSON text).
     params
-        The solver's parameters, defaults filled in.
+        The solver's parameters, including defaults.
     limits
         ``time_s`` and ``memory_mb``.
     opportunity_block
-        The scenario's stored opportunities; none where they are still to be computed.
+        The scenario's stored opportunities; empty if they are still to be computed.
     bound
-        The best bound known of the scenario with its proof (JSON text), or None.
+        The best known bound for the scenario with its proof (JSON text), or None.
     parent
-        Of a replan: the plan before.
+        The parent plan, if this is a replan.
     held_in
-        The worker's folder of ``HeldBlocks``; None where nothing is held.
+        The worker's folder of ``HeldBlocks``, or None if it has none.
     """
 
     job_id: str
@@ -83,24 +83,24 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanAnswer:
-    """What a job leaves behind.
+    """The answer of a job.
 
     Attributes
     ----------
     blocks
-        The timeline document, and every target with its outcome.
+        The timeline document, and each target with its outcome.
     termination
         Why the search ended.
     reward, bound
-        What the referee awarded; what no plan can exceed, where it is known.
+        The reward by the referee; the value that no plan can exceed, if known.
     proof
-        That bound with what proves it (JSON text).
+        The bound with its proof (JSON text).
     opportunity_block
-        Opportunities to store, where this job was the first to compute them.
+        Opportunities to store, if this job was the first to compute them.
     figures
         The timeline's numbers for tables.
     warnings
-        What the timeline says to people.
+        The timeline's messages for people.
     """
 
     blocks: tuple[Block, ...]
@@ -119,5 +119,5 @@ class PlanAnswer:
 
     @property
     def targets(self) -> str:
-        """Return every target with its outcome (JSON text of a list)."""
+        """Return all targets with their outcomes (JSON text of a list)."""
         return targets_text(self.blocks)

@@ -1,7 +1,7 @@
-"""The queue: a small port, and DBOS behind it.
+"""The queue: a small port, implemented with DBOS.
 
 A job's row is the truth; the queue only decides where and when a *dispatch* of it runs. A
-dispatch is named ``"{job_id}:{dispatch}"`` and is never used twice.
+dispatch is named ``"{job_id}:{dispatch}"``; a name is never used twice.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ add_sqlite_clock()
 APPLICATION: Final = "slewline"
 QUEUE: Final = "plan"
 WORKFLOW: Final = "run_job"
-# Pinned: with a version of its own, each release would hide the jobs of the one before.
+# Pinned: if each release had its own version, it would not see the jobs of the one before.
 VERSION: Final = "1"
-# Of a job; the queue itself counts the other way round.
+# Priority of a job; in the queue itself, a lower number is more urgent.
 MOST_URGENT: Final = 9
 
-# At its start it says at length what it is.
+# DBOS logs at length when it starts.
 logging.getLogger("dbos").setLevel(logging.WARNING)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """A dispatch that some worker has taken from the queue and not yet ended."""
+    """A dispatch that a worker has taken from the queue and that has not ended yet."""
 
     job_id: str
     dispatch: int
@@ -46,7 +46,7 @@ class Claim:
 
 
 class JobQueue(Protocol):
-    """What the service needs of a queue."""
+    """What the service needs from a queue."""
 
     def enqueue(
         self, session: Session, job_id: str, dispatch: int, *, priority: int, tenant: str
@@ -55,15 +55,15 @@ class JobQueue(Protocol):
         ...
 
     def cancel(self, job_id: str, dispatch: int) -> None:
-        """Forget a dispatch. Opens its own transaction: call it when yours has ended."""
+        """Remove a dispatch. Opens its own transaction: call it after yours has ended."""
         ...
 
     def claims(self) -> list[Claim]:
-        """Return what workers, dead or alive, have taken."""
+        """Return the dispatches taken by workers, dead or alive."""
         ...
 
     def lost(self, dispatches: Iterable[tuple[str, int]]) -> set[tuple[str, int]]:
-        """Return those dispatches that neither wait nor run any more."""
+        """Return the given dispatches that neither wait nor run any more."""
         ...
 
 
@@ -73,13 +73,13 @@ def dispatch_name(job_id: str, dispatch: int) -> str:
 
 
 def parse_dispatch_name(name: str) -> tuple[str, int]:
-    """Return job id and dispatch number of a name made by ``dispatch_name``."""
+    """Return the job id and dispatch number in a name made by ``dispatch_name``."""
     job_id, _, dispatch = name.rpartition(":")
     return job_id, int(dispatch)
 
 
 def make_queue_engine(database_url: str, timeout_s: float = DEFAULT_TIMEOUT_S) -> sa.Engine | None:
-    """Return the engine DBOS must use, or None where its own will do (SQLite)."""
+    """Return the engine DBOS must use, or None if its own will do (SQLite)."""
     if sa.make_url(database_url).get_backend_name() == "sqlite":
         return None
     engine = make_postgresql_engine(database_url, timeout_s, pool_size=10)
@@ -88,8 +88,8 @@ def make_queue_engine(database_url: str, timeout_s: float = DEFAULT_TIMEOUT_S) -
 
 
 def _mark_disconnect(context: sa.engine.ExceptionContext) -> None:
-    # DBOS tells a lost connection by words that psycopg no longer uses ("connection is bad"),
-    # and then gives up on writing an outcome. SQLAlchemy's own flag it does honour.
+    # DBOS recognizes a lost connection by words that psycopg no longer uses ("connection is bad"),
+    # and then gives up writing an outcome. It does honour SQLAlchemy's own flag.
     import psycopg
 
     error = context.original_exception
@@ -98,21 +98,21 @@ def _mark_disconnect(context: sa.engine.ExceptionContext) -> None:
 
 
 def migrate_queue(settings: Settings) -> None:
-    """Create or update the queue's own tables, and the queue in them."""
+    """Create or update the queue's own tables and register the queue."""
     DBOS.migrate(settings.database_url)
     with closing(DbosQueue(settings.database_url, settings.database_timeout_s)) as queue:
         queue.configure(tenant_limit=settings.max_running_per_tenant, poll_s=settings.queue_poll_s)
 
 
 class DbosQueue:
-    """The queue in the service's own database, by DBOS.
+    """The queue in the service's own database, implemented with DBOS.
 
     Parameters
     ----------
     database_url
-        Where ``migrate_queue`` has been run.
+        A database on which ``migrate_queue`` has been run.
     timeout_s
-        How long a statement may take on PostgreSQL.
+        Time limit of a statement on PostgreSQL.
     """
 
     def __init__(self, database_url: str, timeout_s: float = DEFAULT_TIMEOUT_S):
@@ -126,7 +126,7 @@ class DbosQueue:
         )
 
     def configure(self, *, tenant_limit: int, poll_s: float) -> None:
-        """Set the queue's rules: one job per worker, ``tenant_limit`` at once per tenant."""
+        """Configure the queue: one job per worker, ``tenant_limit`` at once per tenant."""
         self._client.register_queue(
             QUEUE,
             worker_concurrency=1,
@@ -150,11 +150,11 @@ class DbosQueue:
         self._client.enqueue_in_transaction(session, options, job_id, dispatch)
 
     def cancel(self, job_id: str, dispatch: int) -> None:
-        """Take a dispatch from the queue, or free the place of one that was claimed."""
+        """Take a dispatch from the queue, or free the slot of a claimed one."""
         self._client.cancel_workflow(dispatch_name(job_id, dispatch))
 
     def claims(self) -> list[Claim]:
-        """Return what workers, dead or alive, have taken."""
+        """Return the dispatches taken by workers, dead or alive."""
         found = self._client.list_workflows(
             status="PENDING", queue_name=QUEUE, load_input=False, load_output=False
         )
@@ -166,7 +166,7 @@ class DbosQueue:
         return claims
 
     def lost(self, dispatches: Iterable[tuple[str, int]]) -> set[tuple[str, int]]:
-        """Return those dispatches that neither wait nor run any more."""
+        """Return the given dispatches that neither wait nor run any more."""
         asked = set(dispatches)
         alive = self._client.list_workflows(
             workflow_ids=[dispatch_name(*each) for each in asked],
@@ -186,12 +186,12 @@ class DbosQueue:
 class DbosConsumer:
     """The worker's side of the queue: calls ``handle(job_id, dispatch)`` for what it claims.
 
-    Only one may live in a process. ``handle`` runs in a thread of its own, one at a time.
+    Only one may exist per process. ``handle`` runs in a thread of its own, one call at a time.
 
     Parameters
     ----------
     executor_id
-        Must never have been used before: DBOS would restart that worker's dispatches.
+        Must be new: DBOS would restart the dispatches of an earlier worker with the same id.
     """
 
     def __init__(
@@ -223,7 +223,7 @@ class DbosConsumer:
         DBOS.launch()
 
     def stop(self) -> None:
-        """Claim no more, and let go of the database."""
+        """Claim no more dispatches, and close the database connections."""
         DBOS.destroy(destroy_registry=True)
         if self._engine is not None:
             self._engine.dispose()

@@ -1,6 +1,6 @@
-"""Repair: find jobs that nobody runs and claims that nobody needs.
+"""Repair: find jobs that nobody runs and claims that are no longer needed.
 
-Every worker does this every few seconds; the guards on the rows make it safe to do at once.
+Every worker does this every few seconds; guarded updates make concurrent repairs safe.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Reconciler:
     lease_s
         How long a claim may go without a sign of life.
     max_attempts
-        A job whose worker died so often is failed: it is probably the cause.
+        A job that loses its worker this often fails, since it is probably the cause.
     page
         How many waiting jobs are compared with the queue at a time.
     """
@@ -53,7 +53,7 @@ class Reconciler:
         self._judges_from: datetime | None = None
 
     def run(self) -> None:
-        """Look at everything once."""
+        """Check everything once."""
         with self._database.reading() as session:
             now = clock.now(session)
         if self._may_judge(now):
@@ -74,10 +74,10 @@ class Reconciler:
             self._return(job_id, dispatch)
 
     def _may_judge(self, now: datetime) -> bool:
-        """Say whether a lapsed lease means a dead worker.
+        """Return whether a lapsed lease means a dead worker.
 
         Nobody can renew a lease while the database is away, full or locked, and a job must not
-        be blamed for that. Who could not look for long leaves the others the time of one lease.
+        be blamed for that. After a long gap without a look, the others get one lease time to renew.
         """
         lease_time = timedelta(seconds=self._lease_s)
         was_blind = self._looked_at is not None and now - self._looked_at > lease_time / 2
@@ -98,7 +98,7 @@ class Reconciler:
             ).all()
 
     def _recover(self, job_id: str) -> None:
-        """End a job whose lease has lapsed, or queue it anew: one transaction."""
+        """End a job whose lease has lapsed, or queue it again, in one transaction."""
         expired = JobRow.lease_until < utc_now()
         cancelling = expired & (JobRow.state == "cancelling")
         running = expired & (JobRow.state == "running")
@@ -123,7 +123,7 @@ class Reconciler:
             return {row.id: (row.dispatch, row.state) for row in session.execute(wanted)}
 
     def _next_waiting(self) -> list[tuple[str, int]]:
-        """Return the next page of long-queued jobs, so that a long queue is read by and by."""
+        """Return the next page of long-queued jobs, so that a long queue is checked in steps."""
         page = (
             sa.select(JobRow.id, JobRow.dispatch)
             .where(
@@ -143,6 +143,6 @@ class Reconciler:
         with self._database.transaction() as session:
             returned = lease.return_unstarted(session, self._queue, job_id, dispatch)
         if returned:
-            # Its old claim, if any, must not keep a place of the tenant.
+            # Its old claim, if any, must not occupy a slot of the tenant.
             self._queue.cancel(job_id, dispatch)
             log.warning("queued a job again that had never started", extra={"job_id": job_id})

@@ -1,4 +1,4 @@
-"""Renewing a lease beside the run, so that a database that hangs holds up nobody but itself."""
+"""Renewing a lease in parallel with the run, so that a hanging database delays nothing else."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ _PATIENCE_S: Final = 0.25
 
 
 class Renewal:
-    """Calls ``renew`` in a thread of its own, once at a time.
+    """Calls ``renew`` in a thread of its own, one call at a time.
 
-    The run's limits are enforced, and a worker told to stop gives its job up, also while a
-    renewal gets no answer.
+    While a renewal is unanswered, the run's limits are still enforced, and a worker told to stop
+    still gives up its job.
 
     Parameters
     ----------
     renew
-        Renews the lease with the newest progress (None where there is none), and says how to
+        Renews the lease with the newest progress (None if there is none) and returns how to
         go on.
     """
 
@@ -32,7 +32,7 @@ class Renewal:
         self._unsent: Progress | None = None
 
     def tick(self, progress: Progress | None) -> Order:
-        """Renew, or see what became of the last time; go on where there is no answer yet."""
+        """Renew, or look for the answer to the last renewal; go on if there is none yet."""
         self._unsent = progress or self._unsent
         if self._pending is None:
             self._pending = self._thread.submit(self._renew, self._unsent)
@@ -44,5 +44,5 @@ class Renewal:
         return answered.result()
 
     def end(self) -> None:
-        """Renew no more. What is still under way can do no harm: the run number guards it."""
+        """Stop renewing. A renewal still under way does no harm: the run number guards it."""
         self._thread.shutdown(wait=False)

@@ -1,4 +1,4 @@
-"""Deleting what is old, a little at a time."""
+"""Deleting old data, a little at a time."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from service.stores import deletion
 
 _DAY_S: Final = 86_400.0
 _PAUSE_S: Final = 60.0
-"""Between two looks at a database in which nothing was old."""
+"""Pause after a look at the database that found nothing old enough."""
 
 
 class Retention:
-    """Deletes jobs, comparisons and scenarios of one database once they are old enough."""
+    """Deletes jobs, comparisons and scenarios of one database when they are old enough."""
 
     def __init__(self, database: Database, days: float | None):
         self._database = database
@@ -23,7 +23,7 @@ class Retention:
         self._next_s = 0.0
 
     def run(self) -> None:
-        """Delete some, if it is time to look."""
+        """Delete some, if it is time to look again."""
         if self._days is None or time.monotonic() < self._next_s:
             return
         with self._database.transaction() as session:

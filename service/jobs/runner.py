@@ -1,4 +1,4 @@
-"""The worker's side of a solver process: start it, keep its limits, end it."""
+"""The worker's side of a solver process: start it, enforce its limits, end it."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ log = logging.getLogger(__name__)
 
 POLL_S: Final = 0.05
 START_S: Final = 120.0
-"""How long a first start may take; it includes compiling the kernels."""
+"""How long a first start may take, including compilation of the kernels."""
 CANCEL_GRACE_S: Final = 1.25
-"""From "cancel" to the kill, for a search that does not stop by itself."""
+"""From the cancel request to the kill, for a search that does not stop by itself."""
 _LAST_WORDS_S: Final = 5.0
-"""How long a process may take to end whose pipe is closed."""
+"""How long a process may take to end after its pipe has closed."""
 
 _UNKNOWN_EXIT: Final = 255
-"""What `multiprocessing` answers where the fork server, which alone would know, is gone."""
+"""Exit status that `multiprocessing` reports if the fork server, which alone knows it, is gone."""
 
 _SINGLE_THREADED: Final = (
     "OMP_NUM_THREADS",
@@ -56,7 +56,7 @@ _SINGLE_THREADED: Final = (
 
 
 class Order(Enum):
-    """What the worker wants of a run, asked at every tick."""
+    """What the worker wants a run to do; asked at every tick."""
 
     GO_ON = auto()
     CANCEL = auto()
@@ -65,17 +65,17 @@ class Order(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Abandoned:
-    """The run was ended without an answer: somebody else will do the job."""
+    """The run was ended without an answer: another worker will do the job."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The process was taken away with the one it was forked from; the job has no part in that."""
+    """The process died together with the fork server; the job is not to blame."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What one solver process may use. Memory is what it holds, shared libraries included."""
+    """What one solver process may use. Memory is all it holds, including shared libraries."""
 
     time_s: float
     memory_mb: int
@@ -91,7 +91,7 @@ class Work:
     function
         ``"module:function"``, called with a ``PlanRequest`` and a ``Budget``.
     preload
-        Module that the fork server imports before the first job.
+        Module that the fork server imports before its first fork.
     """
 
     function: str = "service.jobs.plan_job:run_plan_job"
@@ -102,14 +102,14 @@ class Runner:
     """Runs one piece of work at a time, each in a fresh fork of a warm process."""
 
     def __init__(self, work: Work):
-        # Libraries start no threads of their own: the workers share the machine between them.
+        # Libraries start no threads of their own, since the workers share the machine.
         os.environ |= dict.fromkeys(_SINGLE_THREADED, "1")
         self._work = work
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([work.preload])
 
     def warm_up(self, is_wanted: Callable[[], bool] = lambda: True) -> bool:
-        """Start the fork server; return whether it was ready before ``is_wanted`` said no."""
+        """Start the fork server; return whether it got ready before ``is_wanted`` said no."""
         process = self._context.Process(target=_nothing, daemon=True)
         process.start()
         while process.is_alive() and is_wanted():
@@ -132,8 +132,8 @@ class Runner:
         Parameters
         ----------
         tick
-            Called every ``tick_s`` with the newest progress, or None where there is nothing
-            new; says how to go on.
+            Called every ``tick_s`` with the newest progress, or None if there is nothing new;
+            returns how to go on.
         on_phase
             Called with the name of each phase when it begins.
         """
@@ -146,7 +146,7 @@ class Runner:
         try:
             process.start()
             theirs.close()
-            request.opportunity_block.take()  # it is sent: only the solver needs it
+            request.opportunity_block.take()  # already sent: only the solver needs it
             return _Run(process, ours, limits, tick_s, tick, on_phase).until_end()
         finally:
             ours.close()
@@ -182,7 +182,7 @@ class _Run:
                 return ending
 
     def _listen(self) -> Ending | Lost | None:
-        """Wait a moment for messages and read all there are: an answer may be among them."""
+        """Wait briefly for messages and read all that are there: one may be the answer."""
         timeout_s = POLL_S
         while wait([self.pipe], timeout_s):
             ending: Ending | Lost | None
@@ -223,14 +223,14 @@ class _Run:
                 self._grant_grace()
 
     def _grant_grace(self) -> None:
-        """Have what is left of this phase end in time; the next one has a grace of its own."""
+        """Limit the rest of this phase; the next phase gets a grace of its own."""
         self._has_grace = True
         if self._cancelled and self._phase != "verify":
             self._kill_at_s = min(self._kill_at_s, time.monotonic() + CANCEL_GRACE_S)
             return
-        # Once the search is over there is a plan, which is worth the wait.
+        # After the search there is a plan, which is worth the wait.
         self._kill_at_s = math.inf
-        with suppress(psutil.NoSuchProcess):  # it has ended; its last words are still to be read
+        with suppress(psutil.NoSuchProcess):  # ended; its last messages are still to be read
             self._grace = Grace(self.process.pid or 0, self._phase or "access")
 
     def _crashed(self) -> Ending | Lost:
@@ -244,7 +244,7 @@ class _Run:
         return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
 
     def _check_limits(self) -> Ending | None:
-        now_mb = held_mb(self.process.pid)  # 0 where it has ended: it is still heard
+        now_mb = held_mb(self.process.pid)  # 0 if it has ended; its messages are still read
         if now_mb > self.limits.memory_mb:
             detail = f"The solver held {now_mb:.0f} MB; its limit is {self.limits.memory_mb} MB."
             return Refused("memory_limit", detail)
@@ -253,7 +253,7 @@ class _Run:
             # The budget ends the search.
             self._expire_at_s = math.inf
             self._grant_grace()
-        # A process that has ended is not killed: its last words are still to be read.
+        # A process that has ended is not killed: its last messages are still to be read.
         if now_s >= self._kill_at_s or (self._grace is not None and self._grace.is_over()):
             return Stopped() if self._cancelled else self._out_of_time()
         return None
@@ -291,7 +291,7 @@ def _nothing() -> None:
 
 
 def _end(process: BaseProcess) -> None:
-    """End a process, politely for half a second, and collect it."""
+    """End a process, with half a second to terminate before it is killed, and reap it."""
     if process.pid is None:
         return
     if process.is_alive():

@@ -1,7 +1,7 @@
-"""A solver's parameters as JSON: their schema, a strict reader, and back.
+"""A solver's parameters as JSON: their schema, and conversion in both directions.
 
-A solver is a frozen dataclass and its fields are its parameters. A field's metadata may say
-``description``, ``minimum``, ``maximum`` and ``exclusiveMinimum`` as JSON Schema does.
+A solver is a frozen dataclass whose fields are its parameters. A field's metadata may give
+``description``, ``minimum``, ``maximum`` and ``exclusiveMinimum`` as in JSON Schema.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DOCUMENTED: Final = ("description", *_LIMITS)
 
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class _Kind:
-    """What values a parameter takes: one JSON type or a choice, and null where it says so."""
+    """The values a parameter takes: one JSON type or a choice, and null if ``nullable``."""
 
     type: object
     choices: tuple[Any, ...]
@@ -42,7 +42,7 @@ class _Kind:
 
 
 def params_schema(cls: type[Solver]) -> dict[str, Any]:
-    """Return the JSON Schema of a solver's parameters, defaults and limits included."""
+    """Return the JSON Schema of a solver's parameters, with defaults and limits."""
     return {
         "type": "object",
         "additionalProperties": False,
@@ -51,12 +51,12 @@ def params_schema(cls: type[Solver]) -> dict[str, Any]:
 
 
 def parse_params(cls: type[Solver], params: Mapping[str, Any]) -> Solver:
-    """Return the solver with these parameters, the others at their defaults.
+    """Return the solver with these parameters and defaults for the others.
 
     Raises
     ------
     InvalidParameters
-        Where a name is unknown or a value is not of its schema; the pointer names it.
+        If a name is unknown or a value does not fit its schema; the pointer names it.
     """
     fields = {field.name: field for field in _fields(cls)}
     for name in params:

@@ -1,4 +1,4 @@
-"""Jobs on their way into the queue: a row and its first dispatch, both or neither."""
+"""Submitting jobs: a row and its first dispatch, both or neither."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from service.process.logs import request_id
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobSpec:
-    """What one job is to do, all defaults filled in."""
+    """What one job is to do, with defaults filled in."""
 
     scenario_id: str
     solver: str
@@ -35,7 +35,7 @@ class JobSpec:
 
 
 def spec_again(job: JobRow, owner: str) -> JobSpec:
-    """Return the spec of the same frozen question once more, for whoever asks it now."""
+    """Return the spec for running a job again with the same input, for a new owner."""
     names = ("scenario_id", "solver", "params", "seed", "limits", "priority", "label")
     same = {name: getattr(job, name) for name in names}
     return JobSpec(**same, owner=owner, rerun_of=job.id)
@@ -67,7 +67,7 @@ def submit(session: Session, queue: JobQueue, spec: JobSpec) -> JobRow:
 def submit_comparison(
     session: Session, queue: JobQueue, specs: Sequence[JobSpec], *, label: str | None
 ) -> ComparisonRow:
-    """Store a comparison and queue a job for each spec, all or none. All plan one scenario."""
+    """Store a comparison and queue a job for each spec, all or none. All share one scenario."""
     comparison = ComparisonRow(
         scenario_id=specs[0].scenario_id,
         tenant=specs[0].owner,

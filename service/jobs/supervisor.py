@@ -23,9 +23,9 @@ _LONGEST_PAUSE_S: Final = 30.0
 
 
 class Supervisor:
-    """Starts workers, starts a new one for each that dies, and stops them all.
+    """Starts workers, replaces each one that dies, and stops them all.
 
-    Each worker is a fresh process with an executor id of its own: a queue must never take a
+    Each worker is a fresh process with an executor id of its own: a queue must never mistake a
     new worker for the one that died.
     """
 
@@ -37,11 +37,11 @@ class Supervisor:
         self._thread = threading.Thread(target=self._watch, name="supervisor", daemon=True)
 
     def start(self) -> None:
-        """Start the workers; returns at once."""
+        """Start the workers without waiting for them."""
         self._thread.start()
 
     def stop(self, *, within_s: float = 10.0) -> None:
-        """Ask all workers to hand their jobs back and end; kill those that do not."""
+        """Ask all workers to hand back their jobs and end; kill those that do not."""
         self._stopping.set()
         if self._thread.ident is not None:
             self._thread.join()
@@ -52,7 +52,7 @@ class Supervisor:
             slot.join(deadline_s - time.monotonic())
 
     def pids(self) -> list[int]:
-        """Return the process ids of the workers that are running."""
+        """Return the process ids of the running workers."""
         return [pid for slot in self._slots if (pid := slot.pid()) is not None]
 
     def _watch(self) -> None:
@@ -63,7 +63,7 @@ class Supervisor:
 
 
 class _Slot:
-    """The place of one worker."""
+    """The slot of one worker."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -76,7 +76,7 @@ class _Slot:
         return self._process.pid
 
     def keep_running(self, command: list[str], environment: dict[str, str]) -> None:
-        """Start a worker where there is none; wait longer each time one dies young."""
+        """Start a worker if there is none; wait longer each time one dies young."""
         now_s = time.monotonic()
         if self._process is not None and self._process.poll() is not None:
             log.warning("a worker ended with status %s", self._process.returncode)
@@ -85,8 +85,8 @@ class _Slot:
             self._process = None
         if self._process is None and now_s >= self._started_s + self._pause_s:
             self._started_s = now_s
-            # In a session of its own, so that Ctrl-C reaches the supervisor alone; what a library
-            # prints must not be taken for words of the service.
+            # In a session of its own, so that Ctrl-C reaches only the supervisor. A library's
+            # prints go to stderr, since stdout is for the service's own output.
             self._process = subprocess.Popen(  # noqa: S603 - our own command
                 command, env=environment, stdout=STDERR, start_new_session=True
             )
@@ -111,7 +111,7 @@ def _command(work: Work) -> list[str]:
 
 
 def environment_of(settings: Settings) -> dict[str, str]:
-    """Return settings as the environment variables that would give them."""
+    """Return settings as the environment variables that would produce them."""
     prefix = settings.model_config.get("env_prefix", "")
     return {
         f"{prefix}{name}".upper(): value if isinstance(value, str) else json.dumps(value)

@@ -1,8 +1,8 @@
-"""Compile the kernels before they are needed, and load them, so that no job pays for it.
+"""Compile the kernels before they are needed, and load them, so that jobs need not wait for it.
 
 ``python -m service.jobs.warm`` fills the cache of compiled kernels on disk. Each part plans a
-tiny mission that needs some of them, since a search in which kernels are compiled has less time
-for its plan. The first parts are those that a demonstration needs, a spacecraft that can be flown
+tiny mission that needs some of them; a search that had to compile kernels would have less time
+for its plan. The parts that a demonstration needs come first: a spacecraft that can be flown
 and every solver.
 """
 
@@ -60,8 +60,8 @@ from service.jobs.compilation_line import CompilationLine
 
 _START: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _FEW: Final = 40  # targets
-_SOME: Final = 60  # enough for every kernel; twice as many take a search of seconds
-_SLOW_DEG_S: Final = 0.05  # it tracks a target ten times as fast
+_SOME: Final = 60  # enough for every kernel; with twice as many, a search takes seconds
+_SLOW_DEG_S: Final = 0.05  # tracking a target needs ten times as much
 
 
 def main() -> None:
@@ -70,7 +70,7 @@ def main() -> None:
 
 
 def warm_up() -> None:
-    """Load in this process what is compiled; where nothing is, compile what a first job needs."""
+    """Load compiled kernels into this process; if there are none, compile those for a first job."""
     if _is_ready(PARTS) or _is_ready(DEMONSTRATION):
         load_stored()
         return
@@ -81,8 +81,8 @@ def warm_up() -> None:
 def make_ready(parts: Iterable[str]) -> None:
     """Compile all parts, or the demonstration's, in as many processes as there are cores.
 
-    It tells how far it is. Parts are taken in their order. Processes that come upon the same
-    kernel share it: one compiles, the others wait for that one alone.
+    Prints its progress. Parts are taken in order. If several processes need the same kernel, one
+    compiles it and the others wait for that kernel only.
     """
     parts = list(parts)
     if _is_ready(parts):
@@ -104,7 +104,7 @@ def make_ready(parts: Iterable[str]) -> None:
                 while not told.empty():
                     line.compiled(told.get())
                 line.show()
-        except BaseException:  # no other part begins
+        except BaseException:  # start no other part
             processes.shutdown(wait=False, cancel_futures=True)
             raise
     line.end()
@@ -114,18 +114,18 @@ def make_ready(parts: Iterable[str]) -> None:
 def _run(part: str) -> None:
     try:
         PARTS[part]()
-    except Exception as error:  # not all errors can be sent to another process
+    except Exception as error:  # some errors cannot be pickled for another process
         raise RuntimeError(f"The kernels of {part!r} cannot be compiled: {error}") from error
 
 
 def _is_ready(parts: Iterable[str]) -> bool:
-    """Return whether all of some parts are compiled, as their sources are now."""
+    """Return whether all the given parts are compiled from the present sources."""
     name = _name(parts)
     if compiled.is_ready(name):
         return True
     stamps = all_stamps()
     is_ready = compiled.stamps(name) == stamps
-    if is_ready:  # what was edited since is part of no kernel
+    if is_ready:  # only sources outside the kernels were edited
         compiled.note(name, stamps)
     return is_ready
 
@@ -156,7 +156,7 @@ def _over_the_globe() -> Scenario:
 
 
 def _flown() -> Scenario:
-    """Return a mission with turns in motion, to the sun and back, and contacts in parts."""
+    """Return a mission with slews in motion, turns to the sun, and contacts in parts."""
     globe = _over_the_globe()
     plain = globe.satellites[0].resources
     agility = Agility(slew_rate_deg_s=2.0, acceleration_deg_s2=0.2, slew_model="moving")
@@ -170,7 +170,7 @@ def _flown() -> Scenario:
 
 
 def _crowd(num_targets: int = 120, *, use_resources: bool = False) -> Scenario:
-    """Return targets near the pole, in each other's way: proofs need all there is."""
+    """Return a mission of conflicting targets near the pole, whose proofs use every method."""
     random = np.random.default_rng(0)
     points = zip(
         random.uniform(60, 85, num_targets), random.uniform(-180, 180, num_targets), strict=True
@@ -184,24 +184,24 @@ def _few() -> Scenario:
 
 
 def _judge() -> None:
-    """Plan by the rule; the referee, the reasons and the quick bound come with it."""
+    """Plan with the rule-based planner: covers the referee, the reasons and the quick bound."""
     _plan(_flown(), Rule())
 
 
 def _judge_worn() -> None:
-    """Have reasons looked for as only where a battery is low and a recorder full."""
+    """Run the searches for reasons that occur only with a low battery and a full recorder."""
     globe = _over_the_globe()
     plain = globe.satellites[0].resources
     low = replace(plain, initial_battery_fraction=0.31, initial_recorder_fraction=0.74)
     worn = _refitted(globe, resources=low)
     _plan(worn, Rule())
     always = BlockedInterval(satellite_id="warm-up", start=worn.horizon.start, end=worn.horizon.end)
-    with suppress(InvalidScenario):  # the recorder does not bear that no contact is left
+    with suppress(InvalidScenario):  # without any contact, the recorder's limit is broken
         _plan(replace(worn, pins=Pins(block=(always,))), Rule())
 
 
 def _search(solver: str) -> Callable[[], None]:
-    """Return the search of a solver alone: what judges its plan is warmed once, by the rule."""
+    """Return only a solver's search: the judging of plans is already warmed by ``_judge``."""
 
     def search() -> None:
         SOLVERS[solver]().solve(_built(_flown()), Budget(), 0)
@@ -210,7 +210,7 @@ def _search(solver: str) -> Callable[[], None]:
 
 
 def _plain() -> None:
-    """Plan with turns from rest to rest, and charge whenever there is nothing else to do."""
+    """Plan with turns from rest to rest, and charge in all idle time."""
     plain = _over_the_globe()
     _plan(plain, Rule(), ForwardSearch(), Graph(path="longest"))
     Certified().solve(_built(plain), Budget(), 0)
@@ -242,7 +242,7 @@ def _continuous_with_resources() -> None:
 def _fleet() -> None:
     fleet = _two(_few())
     _plan(fleet, Rule(), Certified())
-    # So few targets are settled without a plan at the multipliers.
+    # With so few targets, no plan at the multipliers is needed.
     FleetSearch(Incumbent(_built(fleet), Budget(), 0.0), 0).windows(1)
 
 
@@ -251,7 +251,7 @@ def _fleet_with_resources() -> None:
 
 
 def _shortage() -> None:
-    """Run the searches that small missions are settled without."""
+    """Run the searches that small missions do not need."""
     problem = _built(_over_the_globe())
     plan = Rule().solve(problem, Budget(), 0).plan
     AlternatingSearch(problem, plan, problem.typical_worth, Budget(), 0).step(1)
@@ -269,7 +269,7 @@ def _shortage() -> None:
 
 
 def _late() -> None:
-    """Have images that are worth less the later they come down."""
+    """Plan with images that lose worth until they are downlinked."""
     late = with_objective(
         _built(_over_the_globe()), Objective(collected_share=0.0, half_life_s=3600.0)
     )
@@ -280,7 +280,7 @@ def _late() -> None:
 
 
 def _slow() -> None:
-    """Have a satellite that gains by way of tasks what it cannot reach directly."""
+    """Plan for a satellite that reaches some tasks only by way of others."""
     problem = _built(_refitted(_crowd(), agility=Agility(slew_rate_deg_s=_SLOW_DEG_S)))
     Graph().solve(problem, Budget(), 0)
     Milp(formulation="pairwise").solve(problem, Budget(), 0)
@@ -289,14 +289,14 @@ def _slow() -> None:
 
 
 DEMONSTRATION: Final[dict[str, Callable[[], None]]] = {
-    # Judging and the tree search take longest; two processes begin with one each.
+    # Judging and the tree search take longest, so two processes begin with one each.
     "rule": _judge,
     **{name: _search(name) for name in ("mcts", "certified", "milp", "forward_search", "graph")},
-    # What searches of some length need on top of that.
+    # What longer searches need in addition.
     "shortage": _shortage,
 }
 DEMONSTRATED: Final = 0.67
-"""Their share of the lines of all kernels."""
+"""The share of the demonstration in the source lines of all kernels."""
 PARTS: Final[dict[str, Callable[[], None]]] = {
     **DEMONSTRATION,
     "plain": _plain,
@@ -324,12 +324,12 @@ def _built(scenario: Scenario) -> Problem:
 
 
 def _refitted(scenario: Scenario, **changes: Any) -> Scenario:
-    """Return a mission whose satellite is changed."""
+    """Return a mission with a changed satellite."""
     return replace(scenario, satellites=(replace(scenario.satellites[0], **changes),))
 
 
 def _two(scenario: Scenario) -> Scenario:
-    """Return a mission in which another satellite follows its own."""
+    """Return a mission with a second satellite that follows the first."""
     (first,) = scenario.satellites
     orbit = replace(mean_elements(first.orbit), mean_anomaly_deg=20.0, norad_cat_id=2)
     return replace(scenario, satellites=(first, replace(first, id="later", orbit=orbit)))

@@ -1,4 +1,4 @@
-"""One worker: claims jobs, runs each in a solver process, and repairs what others left behind."""
+"""One worker: claims jobs, runs each in a solver process, and recovers the jobs of others."""
 
 from __future__ import annotations
 
@@ -86,11 +86,11 @@ class Worker:
         self._idle.set()
 
     def stop(self) -> None:
-        """Hand the running job back and let ``run`` return; safe in a signal handler."""
+        """Hand back the running job and let ``run`` return; safe in a signal handler."""
         self._stop_request.ask()
 
     def run(self, is_wanted: Callable[[], bool] = lambda: True) -> None:
-        """Work until ``stop`` is called or ``is_wanted`` says no."""
+        """Work until ``stop`` is called or ``is_wanted`` returns False."""
         if not self._runner.warm_up(lambda: is_wanted() and not self._is_stopping()):
             return
         consumer = DbosConsumer(
@@ -113,12 +113,12 @@ class Worker:
         return self._stopping.is_set() or self._stop_request.is_asked()
 
     def handle(self, job_id: str, dispatch: int) -> None:
-        """Run one dispatch from the queue; the queue learns nothing of how it ended."""
+        """Run one dispatch from the queue; how it ended is not reported to the queue."""
         self._idle.clear()
         try:
             self._handle(job_id, dispatch)
         except Exception:
-            # The row still says that the job waits or runs: the reconciler will find it.
+            # The job's row still says queued or running: the reconciler will find it.
             log.exception("dispatch failed", extra={"job_id": job_id})
         finally:
             self._idle.set()
@@ -184,10 +184,10 @@ class Worker:
     def _conclude(
         self, held: Lease, request: PlanRequest, ending: Ending | Abandoned | Lost
     ) -> str:
-        """Write how a run ended, and return it in a word."""
+        """Write how a run ended, and return it as one word."""
         if isinstance(ending, Lost):
             self._persist(lambda session: lease.let_go(session, held))
-            # The next job shall not wait for a new one to fork from while its lease runs.
+            # Start a new fork server before the lease of the next job runs.
             self._runner.warm_up(lambda: not self._is_stopping())
             return "lost"
         if isinstance(ending, Abandoned):
@@ -201,22 +201,22 @@ class Worker:
         return outcome.state
 
     def _share(self, sha256: str, answer: PlanAnswer) -> None:
-        """Store what other jobs of the scenario need not find out again."""
+        """Store what other jobs of the scenario need not compute again."""
         block, bound, proof = answer.opportunity_block, answer.bound, answer.proof
         if block is not None:
             self._persist(lambda session: opportunity_store.save(session, sha256, block))
-        # Who cancels does not wait for a good bound; the next job shall look for one.
+        # A cancelled job has not waited for a good bound; the next job shall look for one.
         if bound is not None and proof is not None and answer.termination != "cancelled":
             self._persist(lambda session: bound_store.save(session, sha256, bound, proof))
 
     def _persist(self, write: Callable[[Session], T]) -> T:
-        """Write in one transaction, as often as it takes."""
+        """Write in one transaction, repeated while the database is away."""
         return self._insist(self._database.transaction, write)
 
     def _insist(
         self, begin: Callable[[], AbstractContextManager[Session]], work: Callable[[Session], T]
     ) -> T:
-        """Do what one transaction does, as often as it takes while the database is away."""
+        """Do the work of one transaction, repeated while the database is away."""
         while True:
             try:
                 with begin() as session:
@@ -256,7 +256,7 @@ class Worker:
 
 
 def outcome_of(ending: Ending) -> Outcome:
-    """Return what an ending means for the job."""
+    """Return the outcome of the job for a run's ending."""
     if isinstance(ending, Refused):
         return Outcome.failed(ending.code, ending.detail)
     if isinstance(ending, Stopped):
@@ -278,7 +278,7 @@ def outcome_of(ending: Ending) -> Outcome:
 def _request(
     session: Session, job_id: str, run: int, held_in: Path | None
 ) -> tuple[PlanRequest, JobRow]:
-    """Return what the solver's process is asked, and the job, which says where it came from."""
+    """Return the request for the solver's process, and its job."""
     wanted = (
         sa.select(JobRow, ScenarioRow.sha256, ScenarioRow.content)
         .join(ScenarioRow, ScenarioRow.id == JobRow.scenario_id)
@@ -303,7 +303,7 @@ def _request(
 
 
 def _parent(session: Session, job: JobRow, held_in: Path | None) -> Parent | None:
-    """Return the plan that a replan goes on from, less what the worker holds of it."""
+    """Return the parent plan of a replan; without its opportunities if the worker holds them."""
     plan_id = (job.change or {}).get("replan_of")
     wanted = (
         sa.select(ScenarioRow.sha256, ScenarioRow.content)
