@@ -1,1 +1,1 @@
-"""Answers of jobs: rendered from judged plans, stored in blocks, read back, taken up again."""
+"""Answers of jobs: rendered from judged plans, stored in blocks, read back, and rebuilt."""

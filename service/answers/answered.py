@@ -1,4 +1,4 @@
-"""What every export is made of: a finished job, read piece by piece as it is written."""
+"""The source of every export: a finished job, read piece by piece as the export is written."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _CHUNK = 1 << 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Satellite:
-    """Id and name, and the blocks of its actions and of what stands behind them."""
+    """Id and name, the blocks of its actions, and those of the fields after them."""
 
     about: Document
     entries: list[Entry]
@@ -54,7 +54,7 @@ class Answered:
     Attributes
     ----------
     head
-        The timeline document but for its satellites.
+        The timeline document without its satellites.
     finished_at
         When the answer was stored, in UTC.
     """
@@ -82,22 +82,22 @@ class Answered:
 
     @property
     def satellites(self) -> list[Document]:
-        """Return id and name of each satellite, as the timeline has them."""
+        """Return id and name of each satellite, as in the timeline."""
         return [satellite.about for satellite in self._satellites]
 
     def actions_of(self, number: int) -> Iterator[Document]:
-        """Yield the actions of a satellite, which is named by its number."""
+        """Yield the actions of the satellite with this index."""
         for _, text in self._texts(self._satellites[number].entries):
             yield from items_in(text)
 
     def each_action(self) -> Iterator[tuple[Document, Document]]:
-        """Yield each action behind its satellite."""
+        """Yield each satellite and action as a pair."""
         for number, satellite in enumerate(self._satellites):
             for action in self.actions_of(number):
                 yield satellite.about, action
 
     def each_image_on_board(self) -> Iterator[Document]:
-        """Yield what became of each image that was on board at the start."""
+        """Yield the outcome of each image that was on board at the start."""
         began_with = {one.satellite_id for one in self.question.states if one.on_board}
         for satellite in self._satellites:
             if satellite.about["id"] in began_with:
@@ -105,18 +105,18 @@ class Answered:
                 yield from rest_in(text).get("on_board", ())
 
     def each_target(self) -> Iterator[Document]:
-        """Yield every target with its outcome."""
+        """Yield each target with its outcome."""
         for _, text in self._texts(self._targets):
             yield from items_in(text)
 
 
 def compact(value: object) -> str:
-    """Return JSON without blanks."""
+    """Return JSON without white space."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
 def listed(items: Iterable[str]) -> Iterator[str]:
-    """Yield the items with a comma between them."""
+    """Yield the items separated by commas."""
     separator = ""
     for item in items:
         yield separator + item
@@ -124,7 +124,7 @@ def listed(items: Iterable[str]) -> Iterator[str]:
 
 
 def in_chunks(parts: Iterable[str]) -> Iterator[str]:
-    """Join small parts of a text: each piece that is sent costs the same, whatever its size.
+    """Join small parts of a text, since sending a piece costs the same whatever its size.
 
     >>> list(in_chunks(["a", "b"]))
     ['ab']
@@ -133,7 +133,7 @@ def in_chunks(parts: Iterable[str]) -> Iterator[str]:
 
 
 def chunked(write: Callable[P, Iterable[str]]) -> Callable[P, Iterator[str]]:
-    """Let a writer yield parts as small as they come: what is sent is joined to chunks."""
+    """Let a writer yield parts of any size: they are joined to chunks for sending."""
 
     @wraps(write)
     def written(*arguments: P.args, **named: P.kwargs) -> Iterator[str]:

@@ -1,7 +1,7 @@
-"""The documents of an answer in blocks: no reader and no writer needs to hold one whole.
+"""The documents of an answer in blocks: neither readers nor writers need to hold a whole one.
 
-The texts of a document's blocks, one behind the other, are the document (JSON). Each block also
-says what is in it, so that a reader takes those that it needs, and no others.
+The texts of a document's blocks, concatenated, are the document (JSON). Each block also describes
+its content, so that a reader can take only the blocks that it needs.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ T = TypeVar("T")
 
 Kind = Literal["head", "satellite", "actions", "rest", "tail", "targets", "proof"]
 TIMELINE: Final[tuple[Kind, ...]] = ("head", "satellite", "actions", "rest", "tail")
-"""The kinds of a timeline's blocks."""
+"""The kinds of blocks in a timeline."""
 
 NUM_ITEMS: Final = 200
-"""Actions or targets of a block: some 80 kB."""
+"""Actions or targets per block: about 80 kB."""
 NUM_CHARS: Final = 1 << 16
-"""Of a block that holds no items."""
+"""Characters per block that holds no items."""
 
 _HEAD_ENDS: Final = ', "satellites": ['
 _SATELLITE_ENDS: Final = ', "actions": ['
@@ -37,16 +37,16 @@ class Block:
     Attributes
     ----------
     kind
-        ``head``: a timeline but for its satellites. ``satellite``: id and name of one.
-        ``actions``: some of what the satellite before it does. ``rest``: more text of that
+        ``head``: a timeline without its satellites. ``satellite``: id and name of one.
+        ``actions``: some actions of the satellite before it. ``rest``: more text of that
         satellite, cut anywhere. ``tail``: a timeline's end. ``targets``: some outcomes.
         ``proof``: text, cut anywhere.
     first
-        The number of the first action, target or satellite, from 0 through the whole document.
+        Index of the first action, target or satellite, from 0 through the whole document.
     num_items
-        How many actions or targets.
+        Number of actions or targets.
     tally
-        Of targets: how many there are of each ``outcome/code of the reason``.
+        For targets: the number of each ``outcome/code of the reason``.
     """
 
     kind: Kind
@@ -58,7 +58,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """A block in a table of contents: all but its text, whose length is ``size``."""
+    """A block in a table of contents: without its text, whose length is ``size``."""
 
     position: int
     kind: Kind
@@ -69,11 +69,11 @@ class Entry:
 
 
 _TOLD: Final = ("kind", "first", "num_items", "tally")
-"""What a block and its entry say alike."""
+"""Fields that a block and its entry share."""
 
 
 def contents_of(blocks: Iterable[Block]) -> list[Entry]:
-    """Return the table of contents of blocks that stand in this order."""
+    """Return the table of contents of blocks in this order."""
     return [
         Entry(position=position, size=len(block.text), **{n: getattr(block, n) for n in _TOLD})
         for position, block in enumerate(blocks)
@@ -83,14 +83,14 @@ def contents_of(blocks: Iterable[Block]) -> list[Entry]:
 def timeline_blocks(
     head: Document, satellites: Iterable[tuple[Document, Iterable[Document], Document]]
 ) -> Iterator[Block]:
-    """Yield a timeline.
+    """Yield the blocks of a timeline.
 
     Parameters
     ----------
     head
-        All of it but the satellites.
+        The timeline without its satellites.
     satellites
-        What stands before the actions of each, its actions, and what stands behind them.
+        For each, the fields before its actions, its actions, and the fields after them.
     """
     yield Block(kind="head", text=json.dumps(head)[:-1] + _HEAD_ENDS)
     num_actions = 0
@@ -109,7 +109,7 @@ def timeline_blocks(
 
 
 def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
-    """Yield a list of targets with their outcomes; its brackets are `targets_text`'s."""
+    """Yield the blocks of a list of targets with outcomes; `targets_text` adds the brackets."""
     first = 0
     for some in _groups(targets):
         yield Block(
@@ -125,12 +125,12 @@ def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
 
 
 def proof_blocks(proof: str) -> Iterator[Block]:
-    """Yield a proof document, given as text."""
+    """Yield the blocks of a proof document, given as text."""
     return (Block(kind="proof", text=part) for part in _parts(proof))
 
 
 def holds(tally: Mapping[str, int], outcome: str | None, reason: str | None) -> bool:
-    """Return whether a block of targets has one of this outcome and reason; None stands for any.
+    """Return whether a block of targets has one with this outcome and reason; None matches any.
 
     >>> holds({"unscheduled/battery": 2}, "unscheduled", None), holds({"collected/": 1}, None, "x")
     (True, False)
@@ -143,17 +143,17 @@ def holds(tally: Mapping[str, int], outcome: str | None, reason: str | None) -> 
 
 
 def head_in(text: str) -> Document:
-    """Return what a ``head`` says."""
+    """Return the content of a ``head``."""
     return _object(f"{text}]}}", "satellites")
 
 
 def satellite_in(text: str) -> Document:
-    """Return what a ``satellite`` says."""
+    """Return the content of a ``satellite``."""
     return _object(f"{text.removeprefix(_BETWEEN)}]}}", "actions")
 
 
 def rest_in(text: str) -> Document:
-    """Return what the ``rest`` of a satellite says, from its texts in one."""
+    """Return the content of a satellite's ``rest``, from its joined texts."""
     rest: Document = json.loads("{" + text.removeprefix("], ")) if text != "]}" else {}
     return rest
 
@@ -165,7 +165,7 @@ def items_in(text: str) -> list[Document]:
 
 
 def batches(items: Iterable[T], size_of: Callable[[T], int], most: int) -> Iterator[list[T]]:
-    """Yield items a few at a time: of this size together, or one that is larger alone."""
+    """Yield items in batches of at most this total size; a larger item is alone in its batch."""
     batch: list[T] = []
     size = 0
     for item in items:
@@ -179,12 +179,12 @@ def batches(items: Iterable[T], size_of: Callable[[T], int], most: int) -> Itera
 
 
 def timeline_text(blocks: Iterable[Block]) -> str:
-    """Return the timeline among blocks as a whole."""
+    """Return the whole timeline among blocks."""
     return "".join(block.text for block in blocks if block.kind in TIMELINE)
 
 
 def targets_text(blocks: Iterable[Block]) -> str:
-    """Return the list of targets among blocks as a whole."""
+    """Return the whole list of targets among blocks."""
     return f"[{''.join(block.text for block in blocks if block.kind == 'targets')}]"
 
 

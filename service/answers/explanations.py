@@ -1,4 +1,4 @@
-"""One target explained at length, every opportunity, and what would give it one."""
+"""One target explained in detail: every opportunity, and what would give it one."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _KEPT_JOBS = 2
 
 
 class Explainer(Background):
-    """Explains targets beside the requests; the jobs looked at last stay compiled."""
+    """Explains targets in the background; the most recent jobs stay compiled."""
 
     _kept, _told = 200, "The explanation is being worked out."
 
     def __init__(self) -> None:
         super().__init__()
-        # Only the thread of the background touches these.
+        # Used only by the background's thread.
         self._jobs: dict[str, Rebuilt] = {}
 
     def get(self, job_id: str, described: Described, timeline: str, target: int) -> ExplanationOut:
-        """Return what there is to say of a target; 503 ``still_computing`` where it takes long."""
+        """Return the explanation of a target; 503 ``still_computing`` if it takes long."""
 
         def work(budget: Budget) -> ExplanationOut:
             job = self._jobs.pop(job_id, None) or rebuild(
@@ -46,7 +46,7 @@ class Explainer(Background):
 
 
 def version_of(job_id: str, target_id: str) -> str:
-    """Return what names an explanation: it follows from the job and this version alone."""
+    """Return what identifies an explanation: it depends only on the job and this version."""
     return f"{planner_core.__version__}/{job_id}/{target_id}"
 
 
@@ -82,7 +82,7 @@ class _Words(Wording):
         )
 
     def _access_change(self, target: int, change: AccessChange) -> Json:
-        """Return a change in the words of a what-if's ``relax``."""
+        """Return a change in the form of a what-if's ``relax``."""
         satellite, own = self.scenario.satellites[change.satellite], self.scenario.targets[target]
         said: Json = {"satellite_id": satellite.id}
         setting: Json = {change.setting: change.value}

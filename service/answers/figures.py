@@ -1,7 +1,7 @@
-"""What there is to say of a plan's images, in numbers.
+"""Figures of a plan's images.
 
-How many are on the ground and how old they are there, what is left on board; and of one image of
-each target how sharp it is, how clear, and whether it is by day.
+How many are on the ground and how old they were on arrival, how much data is left on board; and for
+one image of each target its sharpness, its chance of clear sky, and whether it is by day.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _DIGITS = 9
 
 
 def ages_of(images: Iterable[Collected]) -> AgesOut | None:
-    """Return how old images are when they are on the ground; None where none is."""
+    """Return the ages of images at delivery; None if no image is delivered."""
     age_s = np.array([image.age_s for image in images if image.age_s is not None])
     if len(age_s) == 0:
         return None
@@ -35,12 +35,12 @@ def ages_of(images: Iterable[Collected]) -> AgesOut | None:
 
 
 def num_delivered(problem: Problem, images: Iterable[Collected]) -> int | None:
-    """Return how many images are on the ground; None where there are no contacts."""
+    """Return how many images are on the ground; None if there are no contacts."""
     return sum(image.is_downlinked for image in images) if problem.use_resources else None
 
 
 def in_mbit(scenario: Scenario, problem: Problem, shares: Sequence[float]) -> float | None:
-    """Return how much data it is in all; None where a recorder has no capacity in megabits.
+    """Return the total amount of data; None if a recorder has no capacity in megabits.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def in_mbit(scenario: Scenario, problem: Problem, shares: Sequence[float]) -> fl
 def satellite_totals(
     scenario: Scenario, problem: Problem, timeline: Timeline, index: int, own: ImageFiguresOut
 ) -> SatelliteTotalsOut:
-    """Return what one satellite has a part in; ``own`` is what there is to say of its images."""
+    """Return the totals of one satellite; ``own`` are the figures of its images."""
     line: SatelliteTimeline = timeline.satellites[index]
     images = [image for image in timeline.collected.values() if image.satellite == index]
     capacity_mbit = scenario.satellites[index].resources.recorder_capacity_mbit
@@ -80,7 +80,7 @@ def satellite_totals(
 
 
 class ImageFigures:
-    """Quality and sky of each opportunity, and what they come to over the images of a plan.
+    """Quality and clear-sky probability of each opportunity, and their totals over a plan's images.
 
     Parameters
     ----------
@@ -91,8 +91,8 @@ class ImageFigures:
     Attributes
     ----------
     quality, clear
-        By row of the problem's table. Contacts have 1. ``clear`` is None without a forecast:
-        nothing is known then.
+        By row of the problem's table; 1 for contacts. ``clear`` is None without a forecast,
+        since nothing is known then.
     """
 
     def __init__(self, judged: Judged, own_off_nadir_deg: Mapping[int | None, float]):
@@ -109,7 +109,7 @@ class ImageFigures:
             self.clear[collects] = clear_probabilities(judged.scenario, table, collects)
 
     def of(self, satellite: int | None = None) -> ImageFiguresOut:
-        """Return the figures of one satellite's images, or of all."""
+        """Return the figures of the images of one satellite, or of all."""
         images = [
             image.position
             for image in self._judged.timeline.collected.values()

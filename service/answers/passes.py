@@ -1,4 +1,4 @@
-"""The passes of a plan's horizon, and what the plan does in each."""
+"""The passes in a plan's horizon, and what the plan does in each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class _Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PassFilter:
-    """Which passes are wanted; None for any."""
+    """Which passes are wanted; None matches any."""
 
     station_id: str | None = None
     satellite_id: str | None = None
@@ -38,7 +38,7 @@ class PassFilter:
     planned: bool | None = None
 
     def wants(self, one: PassOut) -> bool:
-        """Return whether a pass is wanted; those that reach into the span are."""
+        """Return whether a pass is wanted; it may lie partly outside the time span."""
         return (
             self.station_id in (None, one.station_id)
             and self.satellite_id in (None, one.satellite_id)
@@ -51,7 +51,7 @@ class PassFilter:
 def passes_of_plan(
     question: StoredQuestion, timeline: TimelineOut, wanted: PassFilter
 ) -> list[PassOut]:
-    """Return the passes that are wanted, by AOS."""
+    """Return the wanted passes in order of AOS."""
     found = station_passes(question.satellites, question.ground_stations, question.horizon)
     contacts = _contacts(question.satellites, timeline)
     alone = [_pass(question, one, contacts) for one in found]
@@ -84,7 +84,7 @@ def _contacts(
 def _volume_mbit(
     satellite: Satellite, action: ActionOut, curves: ResourceCurvesOut | None, origin: datetime
 ) -> float | None:
-    """Return what a contact brings down: the recorder's fall, and what was recorded meanwhile."""
+    """Return the data that a contact downlinks: the recorder's fall plus what is recorded then."""
     resources = satellite.resources
     if (
         curves is None
@@ -105,7 +105,7 @@ def _pass(
     one: StationPass,
     contacts: dict[tuple[str, str], list[_Contact]],
 ) -> PassOut:
-    """Return a pass, without those that overlap it."""
+    """Return a pass without its conflicts."""
     satellite, station = question.satellites[one.satellite], question.ground_stations[one.station]
     aos, tca, los = map(question.horizon.instant, (one.aos_s, one.tca_s, one.los_s))
     own = contacts.get((satellite.id, station.id), [])

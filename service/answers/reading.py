@@ -1,7 +1,7 @@
-"""A plan of any origin read from a file, CSV or JSON.
+"""A plan from any source, read from a CSV or JSON file.
 
-Only what is decided counts: who does what, where and when. All else in a timeline follows
-from that and from the scenario, so it is worked out again and not believed.
+Only the decisions count: who does what, where and when. Everything else in a timeline follows
+from them and the scenario, so it is computed again rather than trusted.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _REQUIRED: Final = ("satellite_id", "mode", "start", "end", "target_id", "statio
 
 
 class ActionIn(Body):
-    """What an action says of itself that cannot be worked out."""
+    """The fields of an action that cannot be computed."""
 
     satellite_id: Id
     mode: Mode
@@ -45,7 +45,7 @@ class ActionIn(Body):
         return self.target_id if self.mode == "collect" else self.station_id
 
     def planned(self) -> PlannedAction:
-        """Return it in the core's terms; it must name its place."""
+        """Return it in the core's terms; it must name its target or station."""
         return PlannedAction(
             start=self.start,
             end=self.end,
@@ -56,7 +56,7 @@ class ActionIn(Body):
 
 
 class UnreadableTimeline(Exception):
-    """A file that holds no plan of the scenario; ``faults`` say where and why."""
+    """A file does not hold a plan of the scenario; ``faults`` say where and why."""
 
     def __init__(self, faults: Sequence[Fault]):
         super().__init__(faults[0].detail)
@@ -65,15 +65,15 @@ class UnreadableTimeline(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """A plan and where its actions stand in the file.
+    """A plan and the locations of its actions in the file.
 
     Attributes
     ----------
     places
         One for each action of the plan: ``line 7``, or a JSON pointer.
     impossible
-        Sentences about tasks for which the scenario has no access at all, with their places:
-        no referee needs to look at those, and the plan is without them.
+        Places and messages of tasks for which the scenario has no access at all: these need no
+        referee, and the plan omits them.
     """
 
     plan: Plan
@@ -82,9 +82,9 @@ class Reading:
 
 
 def records_of_csv(data: bytes) -> Records:
-    """Return the rows of a table such as `table.write` makes; further columns do not matter."""
+    """Return the rows of a table such as `table.write` makes; other columns are ignored."""
     found = read_csv(data, _REQUIRED, _REQUIRED, most=_MOST_ACTIONS)
-    # A plan may be empty; a file without a header is none.
+    # A plan may be empty, but a file without a header is not a plan.
     faults = [f for f in found.faults if f.code != "empty_file" or not data.strip()]
     records = []
     for one in found.records:
@@ -132,13 +132,13 @@ def _record(satellite: Mapping[str, Any], action: object, pointer: str, position
 def plan_in(records: Records, scenario: Scenario, problem: Problem) -> Reading:
     """Return the plan that a file describes, as actions of the problem.
 
-    An action takes the opportunity of its satellite and place whose access it lies in or comes
-    closest to; whether it fits is for the referee to say.
+    An action takes the opportunity, of its satellite and site, whose access contains it or is
+    closest to it; whether it fits is for the referee to say.
 
     Raises
     ------
     UnreadableTimeline
-        Where something is wrong with the file, or it names what the scenario does not have.
+        If the file is faulty, or names what the scenario does not have.
     """
     finder = Finder(scenario, problem)
     checked, faults = check(records.records, ActionIn, finder.require_known)
@@ -169,7 +169,7 @@ def _site(one: Checked[ActionIn]) -> str:
 
 
 class Finder:
-    """The opportunities of a problem, by what their scenario calls them."""
+    """The opportunities of a problem, by the ids of their scenario."""
 
     def __init__(self, scenario: Scenario, problem: Problem):
         self._horizon = scenario.horizon
@@ -185,7 +185,7 @@ class Finder:
         self._keys = keys[self._order]
 
     def require_known(self, action: ActionIn) -> None:
-        """Raise where the scenario knows nothing of what an action names."""
+        """Raise if an action names what the scenario does not have."""
         self._require("satellite", action.satellite_id)
         if action.mode not in IDLE_MODES:
             self._require(_SITES[action.mode], action.site_id)
@@ -193,7 +193,7 @@ class Finder:
             raise InvalidScenario("invalid_time", "It ends before it starts.", pointer="/end")
 
     def action(self, task: PlannedAction) -> Action | None:
-        """Return the action that is meant; None where no opportunity is what it names."""
+        """Return the action that is meant; None if there is no such opportunity."""
         satellite = self._numbers["satellite"][task.satellite_id]
         site = self._numbers[_SITES[task.mode]][task.site_id]
         start_s = self._horizon.offset_s(task.start)
@@ -227,4 +227,4 @@ READERS: Final[dict[str, Callable[[bytes], Records]]] = {
     ".json": records_of_json,
     ".csv": records_of_csv,
 }
-"""By the suffix of the file."""
+"""By file suffix."""

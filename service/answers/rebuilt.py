@@ -1,4 +1,4 @@
-"""A finished job taken up again: its plan read back, beside others or in its problem."""
+"""A finished job rebuilt: its plan read back, for comparison or as actions of its problem."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FIGURES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rebuilt:
-    """What the solver's process had at its end."""
+    """What the solver's process had when it ended."""
 
     scenario: Scenario
     computed: ScenarioOpportunities
@@ -60,12 +60,12 @@ def rebuild(described: Described, timeline: TimelineOut, budget: Budget) -> Rebu
 
 
 def stored_plan(timeline: TimelineOut, scenario: Scenario, problem: Problem) -> Plan:
-    """Return the plan of a stored timeline as actions of a problem, as far as it has them."""
+    """Return the plan of a stored timeline as actions of a problem, without those it lacks."""
     found = map(Finder(scenario, problem).action, planned(timeline))
     plan = Plan(tuple(sorted(action for action in found if action is not None)))
     if problem.continuous_starts:
         return plan
-    # Documents have milliseconds; the opportunities' own times are exact.
+    # Documents are rounded to milliseconds; the opportunities' own times are exact.
     return Plan.of(problem, dict.fromkeys(action.opportunity for action in plan.actions))
 
 

@@ -1,4 +1,4 @@
-"""A judged plan in the words of the API: its timeline, what became of each target, and why."""
+"""A judged plan in the API's terms: its timeline, and the outcome of each target with reasons."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _OF_TOTALS: Final = FiguresOut.model_fields.keys() & TotalsOut.model_fields.keys
 
 
 def figures_of(timeline: Json) -> Json:
-    """Return the numbers of a timeline (its head will do) that a table of several plans shows."""
+    """Return the numbers of a timeline (its head is enough) for a table of several plans."""
     runtime_s = timeline["runtime_s"]
     figures = FiguresOut(
         **{name: timeline["totals"].get(name) for name in _OF_TOTALS},
@@ -65,9 +65,9 @@ def figures_of(timeline: Json) -> Json:
 
 
 class Wording:
-    """What a judged plan is called: its actions, opportunities, instants, reasons.
+    """Names things of a judged plan: its actions, opportunities, instants, reasons.
 
-    Action ids run through all satellites, ``a1``, ``a2``, ...
+    Action ids are numbered through all satellites: ``a1``, ``a2``, ...
     """
 
     def __init__(self, scenario: Scenario, problem: Problem, timeline: Timeline):
@@ -87,7 +87,7 @@ class Wording:
         return None if row is None else f"o{self.problem.scenario_row(row)}"
 
     def violation(self, found: Violation) -> ViolationOut:
-        """Return a rule that is broken; actions that the plan does not have are left out."""
+        """Return a violation, leaving out blamed actions that the plan does not have."""
         ids = self.action_ids
         return ViolationOut(
             code=found.code,
@@ -102,7 +102,7 @@ class Wording:
         )
 
     def target(self, found: TargetOutcome) -> TargetItem:
-        """Return what became of a target."""
+        """Return the outcome of a target."""
         target = self.scenario.targets[found.target]
         satellite = None if found.satellite is None else self.problem.satellites[found.satellite]
         collected = self._timeline.collected.get(found.target)
@@ -133,7 +133,7 @@ class Wording:
         )
 
     def _image_then(self, row: int | None, reward: float) -> str:
-        """Return what the image of a reason would be worth, where that is less than the reward."""
+        """Return what the image of a reason would be worth, if that is less than the reward."""
         if row is None or self.problem.worth[row] >= reward:
             return ""
         sky = ""
@@ -144,7 +144,7 @@ class Wording:
         return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}{sky}."
 
     def _change(self, change: Change) -> Json:
-        """Return a change in the words of a what-if's ``relax``."""
+        """Return a change in the form of a what-if's ``relax``."""
         found: Json = {"opportunity_id": self.opportunity_id(change.opportunity)}
         if change.satellite is None:
             return found | {"drop_actions": [self.action_ids[p] for p in change.drop]}
@@ -162,7 +162,7 @@ class Documents(Wording):
         self._images = ImageFigures(judged, {p: seen[0] for p, seen in self._seen.items()})
 
     def head(self, *, job_id: str, scenario_sha256: str, solver: SolverUsed) -> TimelineHead:
-        """Return the timeline but for its satellites."""
+        """Return the timeline without its satellites."""
         judged, horizon = self._judged, self.scenario.horizon
         phases = ("access", "compile", "solve", "verify")
         return TimelineHead(
@@ -191,7 +191,7 @@ class Documents(Wording):
         )
 
     def satellites(self) -> Iterator[tuple[SatelliteTimelineOut, Iterator[ActionOut]]]:
-        """Yield what the timeline says of each satellite, and apart from that its actions."""
+        """Yield the timeline of each satellite, and separately its actions."""
         judged, numbers = self._judged, count(1)
         parts = zip(
             judged.problem.satellites,
@@ -231,7 +231,7 @@ class Documents(Wording):
                 )
 
     def targets(self) -> Iterator[TargetItem]:
-        """Yield every target once, with outcome and reason."""
+        """Yield each target once, with outcome and reason."""
         return (self.target(outcome) for outcome in self._judged.outcomes)
 
     def _totals(self) -> TotalsOut:
@@ -328,7 +328,7 @@ def _slew(slew: Slew) -> SlewOut:
 def _seen_at_own_starts(judged: Judged) -> dict[int | None, tuple[float, float]]:
     """Return off-nadir angle and azimuth at the middle of each collect with a start of its own.
 
-    By position in the plan; all else is in the table of opportunities.
+    By position in the plan; for other collects, the table of opportunities has them.
     """
     table, problem = judged.opportunities.opportunities, judged.problem
     moved = [

@@ -1,4 +1,4 @@
-"""Answers of jobs: written block by block, and read so."""
+"""Answers of jobs, written and read block by block."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from service.db.clock import utc_now
 from service.db.rows import JobBlockRow, JobResultRow
 
 _AT_ONCE: Final = 1 << 17
-"""Characters that are read or written in one statement."""
+"""Characters per statement that reads or writes."""
 _SIZE: Final = attrgetter("size")
 _TOLD: Final = ("position", "kind", "first", "num_items", "size")
-"""What a table of contents and its row tell alike."""
+"""Fields that a table of contents and its row share."""
 
 
 def save(
@@ -44,12 +44,12 @@ def save(
 
 
 def answered_at(session: Session, job_id: str) -> datetime | None:
-    """Return when a job's answer was stored, or None where it has none (yet)."""
+    """Return when a job's answer was stored, or None if it has none (yet)."""
     return session.scalar(sa.select(JobResultRow.created_at).where(JobResultRow.job_id == job_id))
 
 
 def contents(session: Session, job_id: str, *kinds: Kind) -> list[Entry]:
-    """Return the table of contents of a job's answer, as far as it is of these kinds."""
+    """Return the blocks of these kinds in the table of contents of a job's answer."""
     row = JobBlockRow
     columns = [getattr(row, name) for name in _TOLD]
     wanted = sa.select(row.tally, *columns).where(row.job_id == job_id, row.kind.in_(kinds))
@@ -64,8 +64,8 @@ def texts(
 ) -> Iterator[tuple[Entry, str]]:
     """Yield blocks with their texts, a few at a time.
 
-    Each few are read in a transaction of their own: who is slow to take them keeps no connection
-    from others, and answers never change.
+    Each batch is read in a transaction of its own, so that a slow reader keeps no connection
+    from others; this is safe because answers never change.
     """
     for some in batches(entries, _SIZE, _AT_ONCE):
         wanted = sa.select(JobBlockRow.position, JobBlockRow.text).where(
@@ -79,12 +79,12 @@ def texts(
 
 
 def timeline_of(session: Session, job_id: str) -> str | None:
-    """Return a job's timeline document as a whole, or None where there is none (yet)."""
+    """Return a job's whole timeline document, or None if there is none (yet)."""
     return _whole(session, job_id, *TIMELINE)
 
 
 def proof_of(session: Session, job_id: str) -> str | None:
-    """Return what proves a job's bound as JSON text, or None where there is none."""
+    """Return the proof of a job's bound as JSON text, or None if there is none."""
     return _whole(session, job_id, "proof")
 
 

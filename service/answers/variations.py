@@ -1,4 +1,4 @@
-"""What if: the question of a job with a change, compiled once to see that it can be asked."""
+"""What if: a job's scenario with a change, compiled once to check that it is possible."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from service.wire.timelines import IDLE_MODES, TimelineOut
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Variation:
-    """A changed question, ready to be stored, and its opportunities as they are stored."""
+    """A changed scenario, ready to be stored, and its opportunities as stored."""
 
     frozen: FrozenScenario
     opportunity_block: bytes
@@ -46,7 +46,7 @@ class Variation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """A job's question (a canonical scenario file), its timeline if it has one, and the change."""
+    """A job's scenario (a canonical file), its timeline if it has one, and the change."""
 
     content: str
     timeline: str | None
@@ -55,33 +55,33 @@ class Asked:
 
     @property
     def key(self) -> str:
-        """What tells two of these apart."""
+        """A key that differs for different requests."""
         change = self.change.model_dump_json(exclude_unset=True)
         return sha256_of(f"{sha256_of(self.content)}{sha256_of(self.timeline or '')}{change}")
 
 
 class Variations(Background):
-    """Works out changed questions beside the requests."""
+    """Computes changed scenarios in the background."""
 
     _kept, _told = 8, "The change is being worked out."
 
     def get(self, asked: Asked, described: Described) -> Variation:
-        """Return the changed question; 503 ``still_computing`` where that takes long.
+        """Return the changed scenario; 503 ``still_computing`` if that takes long.
 
         Raises
         ------
         PlannerError
-            The change is impossible; with a pointer into it.
+            If the change is impossible; with a pointer into it.
         """
         return self.work_out(asked.key, lambda budget: vary(asked, described, budget))
 
 
 def vary(asked: Asked, described: Described, budget: Budget) -> Variation:
-    """Return the changed question; errors as above."""
+    """Return the changed scenario; raises as ``Variations.get`` does."""
     change = asked.change
     file = relaxed_file(read_file(json.loads(asked.content)), change.relax)
     scenario = scenario_from_file(file)
-    # Whether the satellites can be carried so far is known only after this.
+    # Only here does it show whether the satellites can be propagated over the whole horizon.
     with pointing(place_in_relax):
         _freeze(file, asked)
         computed = _opportunities(scenario, described, budget)
@@ -110,14 +110,14 @@ def _freeze(file: ScenarioFile, asked: Asked) -> FrozenScenario:
 def _opportunities(
     scenario: Scenario, described: Described, budget: Budget
 ) -> ScenarioOpportunities:
-    """Return those that are known already, where the change has nothing to do with geometry."""
+    """Return the known opportunities if the change does not affect geometry, else new ones."""
     if _geometry(scenario) == _geometry(described.scenario):
         return described.computed
     return compute_opportunities(scenario, budget)
 
 
 def _geometry(scenario: Scenario) -> Scenario:
-    """Return the scenario with everything made equal that no opportunity depends on."""
+    """Return the scenario with everything equalized that opportunities do not depend on."""
     some = Resources.paper(1.0)
     return replace(
         scenario,
@@ -140,12 +140,12 @@ def _geometry(scenario: Scenario) -> Scenario:
 
 
 def _slew_model_of(agility: Agility) -> Agility:
-    """Return what opportunities know of how a satellite turns: whether in motion."""
+    """Return the only part of an agility that opportunities depend on: its slew model."""
     return Agility(slew_model="moving", acceleration_deg_s2=1.0) if agility.tracks else Agility()
 
 
 def _dropped(asked: Asked, timeline: TimelineOut | None) -> list[PinnedAction]:
-    """Return the actions of the plan that are to be left out."""
+    """Return the actions of the plan that are to be dropped."""
     if not asked.change.relax.drop_actions:
         return []
     actions = {

@@ -1,4 +1,4 @@
-"""A typed client of the service's HTTP API, which needs none of the service's own parts.
+"""A typed client of the service's HTTP API, independent of the service's own modules.
 
 >>> from service.client import Client
 >>> Client("http://127.0.0.1:8000")

@@ -1,4 +1,4 @@
-"""The client: an address, a key, and what the service offers."""
+"""The client: an address, a key, and the resources of the service."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ _KEY = re.compile(r"[\x21-\x7e]+")
 
 
 class Client:
-    """A service, and all that can be asked of it. Threads may share one.
+    """A client of one service. Threads may share it.
 
     Parameters
     ----------
     url, key
-        Where the service is, and the API key it asks for; by default what the environment
-        says in ``SLEWLINE_URL`` and ``SLEWLINE_KEY``, or the service of this machine.
+        The service's address and the API key; by default those in the environment variables
+        ``SLEWLINE_URL`` and ``SLEWLINE_KEY``, or a service on this machine.
     timeout_s
-        For how long one answer may keep silent.
+        How long to wait for the next part of an answer.
     patience_s
-        For how long a request that is lost, or that the service cannot take now, is sent again.
+        How long to resend a request that is lost, or that the service cannot take now.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Client:
             base_url=address,
             headers=headers,
             timeout=timeout_s,
-            trust_env=not _is_this_machine(address.host),  # no proxy leads back to it
+            trust_env=not _is_this_machine(address.host),  # a proxy cannot reach this machine
         )
         self._transport = Transport(self._http, patience_s=patience_s)
         self.satellites = Satellites(self._transport)
@@ -79,11 +79,11 @@ class Client:
 
     @property
     def url(self) -> str:
-        """Where the service is."""
+        """The service's address."""
         return self._transport.address
 
     def solvers(self) -> Iterator[Solver]:
-        """Yield the solvers that the service has."""
+        """Yield the service's solvers."""
         return self._transport.pages(path_of("solvers"), Solver)
 
     def solver(self, name: str) -> Solver:
@@ -91,11 +91,11 @@ class Client:
         return self._transport.get(path_of("solvers", name), Solver)
 
     def version(self) -> Version:
-        """Return what runs there."""
+        """Return the versions of what runs there."""
         return self._transport.get("/version", Version)
 
     def ready(self) -> Ready:
-        """Return who takes jobs there; a ``ServiceError`` at once where nobody does."""
+        """Return the service's readiness; a ``ServiceError`` at once if it is not ready."""
         return held(Ready, self._transport.request("GET", "/health/ready", patience_s=0.0))
 
     def close(self) -> None:
@@ -123,7 +123,7 @@ def _address(url: str) -> httpx.URL:
 
 
 def _sendable(key: str) -> str:
-    # httpx would name the key in its complaint.
+    # httpx would quote the key in its error message.
     if not _KEY.fullmatch(key):
         raise ValueError("the API key has characters that no key has, a line's end perhaps")
     return key

@@ -1,4 +1,4 @@
-"""What can be done with the things of every kind, wherever they are stored."""
+"""Operations common to all kinds of resources."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ M = TypeVar("M", bound=Wire)
 
 
 class Collection(Generic[M]):
-    """The things of one kind, each by its id.
+    """The resources of one kind, addressed by id.
 
-    A subclass says with ``_name`` where in the API they are, and with ``_shape`` what one is.
+    A subclass gives their path in the API as ``_name`` and their model as ``_shape``.
     """
 
     _name: str
@@ -24,7 +24,7 @@ class Collection(Generic[M]):
         self._transport = transport
 
     def get(self, own_id: str, /) -> M:
-        """Return one as it stands."""
+        """Return one in its current state."""
         return self._transport.get(self._path(own_id), self._shape)
 
     def list(self) -> Iterator[M]:
@@ -32,7 +32,7 @@ class Collection(Generic[M]):
         return self._listed()
 
     def delete(self, own_id: str, /, *, if_match: str | None = None) -> None:
-        """Delete one; where ``if_match`` is given, only if it is still as that says."""
+        """Delete one; if ``if_match`` is given, only in the state that it names."""
         self._transport.delete(self._path(own_id), if_match=if_match)
 
     def _path(self, *parts: str) -> str:
@@ -48,10 +48,10 @@ class Collection(Generic[M]):
 
 
 class Changeable(Collection[M]):
-    """Things that can be changed in part."""
+    """Resources that can be changed in part."""
 
     def change(self, own_id: str, /, *, if_match: str | None = None, **changes: Any) -> M:
-        """Change what is given, where the thing is still as ``if_match`` says."""
+        """Change the given fields; if ``if_match`` is given, only in the state that it names."""
         return self._transport.change(
             "PATCH", self._path(own_id), self._shape, changes, if_match=if_match
         )

@@ -1,4 +1,4 @@
-"""Comparisons: several solvers on one frozen scenario, and one table of what they found."""
+"""Comparisons: several solvers on one frozen scenario, with one table of their results."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from service.wire.scenarios import ScenarioOut as Scenario
 
 
 class Comparisons(Collection[Comparison]):
-    """The comparisons of the service. The jobs of one that is deleted stay."""
+    """The comparisons of the service. Deleting one keeps its jobs."""
 
     _name, _shape = "comparisons", Comparison
 
@@ -38,19 +38,19 @@ class Comparisons(Collection[Comparison]):
         scenario
             As for a job.
         runs
-            Each with ``solver`` and, where wanted, ``params`` and ``seed``.
+            Each with ``solver`` and optionally ``params`` and ``seed``.
         """
         body = question(scenario, time_s, memory_mb, priority, label)
         body["runs"] = [dict(run) for run in runs]
         return self._create(body, idempotency_key)
 
     def wait(self, comparison_id: str, timeout_s: float | None = None) -> Comparison:
-        """Return the table once every job has ended, well or not.
+        """Return the table when every job has ended, successfully or not.
 
         Raises
         ------
         WaitTimedOut
-            Where one has not after ``timeout_s``.
+            If a job has not ended after ``timeout_s``.
         """
         read = partial(parsed, Comparison, what="a comparison")
         path = self._path(comparison_id)

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 class ClientError(Exception):
-    """The base of every error of this package."""
+    """The base class of all errors of this package."""
 
 
 class Unreachable(ClientError):
-    """No answer came, for as long as the client is patient."""
+    """No answer came within the client's patience."""
 
 
 class UnexpectedAnswer(ClientError):
-    """The answer is not what the API says: another program, or a version that does not fit."""
+    """The answer does not fit the API: another program, or an incompatible version."""
 
 
 class ServiceError(ClientError):
@@ -34,14 +34,14 @@ class ServiceError(ClientError):
     Attributes
     ----------
     status, code, detail
-        Of the problem document; ``code`` is stable, and ``http_502`` and the like where the
-        answer was none of the service's own.
+        From the problem document; ``code`` is stable. It is ``http_502`` or the like if the
+        answer does not come from the service itself.
     errors
         Each single fault, with its JSON pointer or line of the file.
     request_id
-        What to search the service's log for.
+        The id to search for in the service's log.
     retry_after_s
-        When to come back, where the service said so.
+        When to try again, if the service said so.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class ServiceError(ClientError):
 
 
 class JobFailed(ClientError):
-    """A job ended without doing what was asked; ``job.error`` says why."""
+    """A job ended without a result; ``job.error`` says why."""
 
     def __init__(self, job: Job):
         why = f"{job.error.code}: {job.error.detail}" if job.error else "no reason is given"
@@ -73,16 +73,16 @@ class JobFailed(ClientError):
 
 
 class WaitTimedOut(ClientError):
-    """What was waited for did not happen in time. It goes on: this ends only the waiting."""
+    """The expected state was not reached in time. Only the waiting ends; the job goes on."""
 
 
 def error_of(response: httpx.Response) -> ServiceError:
-    """Return the error that an answer tells, a problem document or not."""
+    """Return the error of an answer, which may or may not be a problem document."""
     try:
         told = read(ProblemOut, response.content)
         about = {name: told[name] for name in ("code", "detail", "errors", "request_id")}
     except ValidationError:
-        # A proxy on the way, for example, which answers in HTML.
+        # For example from a proxy that answers in HTML.
         where = response.headers.get("location")
         detail = response.reason_phrase or "no explanation"
         about = {
@@ -94,7 +94,7 @@ def error_of(response: httpx.Response) -> ServiceError:
 
 
 def seconds_asked(response: httpx.Response) -> float | None:
-    """Return what ``Retry-After`` asks for, in seconds; None where there is none to be read."""
+    """Return the seconds asked for by ``Retry-After``; None if it is missing or unreadable."""
     text = response.headers.get("retry-after", "").strip()
     if text.isdecimal():
         return float(text)

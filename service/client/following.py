@@ -1,4 +1,4 @@
-"""Watching a job: its events as they come, or asking where they cannot be had."""
+"""Watching a job: its events as they come, or polling if there is no event stream."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from service.client.transport import Transport
 log = logging.getLogger("service.client")
 
 HOLD_S: Final = 10.0
-_SILENCE_S: Final = 30.0  # of a stream on which the service gives a sign of life every 10 s
+_SILENCE_S: Final = 30.0  # of a stream on which the service sends something every 10 s
 _EMPTY_STREAMS: Final = 3
 _PAUSE_S: Final = 0.5
 
 
 class Watched(Protocol):
-    """What changes until it is final."""
+    """A resource that changes until it is final."""
 
     @property
     def is_final(self) -> bool:
-        """Whether it changes no more."""
+        """Whether it no longer changes."""
 
 
 W = TypeVar("W", bound=Watched)
 
 
 def follow(transport: Transport, path: str, parse: Callable[[str], W]) -> Iterator[W]:
-    """Yield a job as it is, then at each change, until it is final.
+    """Yield a job as it is, then after each change, until it is final.
 
-    A stream of events that breaks is taken up where it broke. Where none can be had, the job
-    is asked for instead; the first answer may then repeat the last event.
+    A broken stream of events is resumed where it broke. If no stream is available, the job
+    is polled instead; the first answer may then repeat the last event.
     """
     for job in events(transport, path, parse):
         yield job
@@ -47,7 +47,7 @@ def follow(transport: Transport, path: str, parse: Callable[[str], W]) -> Iterat
 
 
 def events(transport: Transport, path: str, parse: Callable[[str], W]) -> Iterator[W]:
-    """Yield a job's events, for as long as they can be had."""
+    """Yield a job's events for as long as a stream of them is available."""
     last_id, num_empty = "", 0
     while num_empty < _EMPTY_STREAMS:
         headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
@@ -77,7 +77,7 @@ def polled(
     timeout_s: float | None = None,
     can_hold: bool = True,
 ) -> Iterator[W]:
-    """Yield what is at a path at each change, until it is final; it is asked for with its ETag.
+    """Yield what is at a path, then after each change, until it is final; polls with its ETag.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def polled(
     Raises
     ------
     WaitTimedOut
-        Where it is not final after ``timeout_s``.
+        If it is not final after ``timeout_s``.
     """
     etag: str | None = None
     until_s = None if timeout_s is None else time.monotonic() + timeout_s
     while True:
         asked_at_s = time.monotonic()
         params, headers = {}, {}
-        # What is there now is answered at once; only a change from it is waited for.
+        # The first answer comes at once; only a change from a known state is waited for.
         if etag is not None:
             headers["If-None-Match"] = etag
             left_s = HOLD_S if until_s is None else min(HOLD_S, until_s - asked_at_s)

@@ -8,9 +8,9 @@ from service.wire.forecasts import ForecastOut as Forecast
 
 
 class Forecasts(Collection[Forecast]):
-    """The forecasts that are stored, without their values.
+    """The stored forecasts, without their values.
 
-    Scenarios keep what a forecast said of their targets when it is deleted.
+    When a forecast is deleted, scenarios keep its values for their targets.
     """
 
     _name, _shape = "forecasts", Forecast
@@ -31,8 +31,8 @@ class Forecasts(Collection[Forecast]):
         file, form
             A file, or its content and form: ``csv`` or ``netcdf``.
         default_clear_probability
-            Of targets and instants that the file does not cover; None to refuse scenarios with
-            such.
+            For targets and instants that the file does not cover; if None, scenarios with such
+            are refused.
         """
         return self._transport.post(
             self._path(),

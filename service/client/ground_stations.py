@@ -12,7 +12,7 @@ from service.wire.sites import ImportedStation
 
 
 class GroundStations(Changeable[GroundStation]):
-    """The ground stations that are stored. Scenarios keep their copy of one that is deleted."""
+    """The stored ground stations. Scenarios keep their copy of a deleted one."""
 
     _name, _shape = "ground-stations", GroundStation
 
@@ -37,7 +37,7 @@ class GroundStations(Changeable[GroundStation]):
         reject_all: bool = False,
         idempotency_key: str | None = None,
     ) -> Import[ImportedStation]:
-        """Store the stations of a file, ``csv`` or ``geojson``; those that are known stay one."""
+        """Store the stations of a ``csv`` or ``geojson`` file, without duplicating known ones."""
         return self._transport.post(
             self._path("import"),
             Import[ImportedStation],

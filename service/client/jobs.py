@@ -1,4 +1,4 @@
-"""Jobs: send one, follow it, read its answer."""
+"""Jobs: submit one, follow it, read its answer."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ _OPENMCT = ".openmct.json"
 
 
 class Job(JobOut):
-    """A job as it stood when it was read; what asks the service returns a new one."""
+    """A job as it stood when it was read; methods that ask the service return a new one."""
 
     _jobs: Jobs = PrivateAttr()
 
     def refresh(self) -> Job:
-        """Return the job as it stands now."""
+        """Return the job in its current state."""
         return self._jobs.get(self.id, known=self)
 
     def follow(self) -> Iterator[Job]:
-        """Yield the job as it is, then at each change, until it is final."""
+        """Yield the job as it is, then after each change, until it is final."""
         return self._jobs.follow(self.id)
 
     def wait(self, timeout_s: float | None = None) -> Job:
-        """Return the job once it has succeeded or was cancelled.
+        """Return the job when it has succeeded or was cancelled.
 
         Raises
         ------
         JobFailed
-            Where it ends in any other way.
+            If it ends in any other way.
         WaitTimedOut
-            Where it is not final after ``timeout_s``.
+            If it is not final after ``timeout_s``.
         """
         return self._jobs.wait(self.id, timeout_s)
 
@@ -54,34 +54,34 @@ class Job(JobOut):
         return self._jobs.cancel(self.id)
 
     def rerun(self) -> Job:
-        """Queue the same question again."""
+        """Queue the same job again."""
         return self._jobs.rerun(self.id)
 
     def timeline(self) -> Timeline:
-        """Return its plan, judged."""
+        """Return its plan as judged by the referee."""
         return self._jobs.timeline(self.id)
 
     def download(self, file: Path | str) -> Path:
-        """Write its timeline to a file, in the form that the suffix names."""
+        """Write its timeline to a file, in the format of the file's suffix."""
         return self._jobs.download(self.id, file)
 
     def targets(
         self, *, outcome: str | None = None, reason: str | None = None
     ) -> Iterator[TargetOutcome]:
-        """Yield every target of the scenario with what became of it."""
+        """Yield each target of the scenario with its outcome."""
         return self._jobs.targets(self.id, outcome=outcome, reason=reason)
 
     def explanation(self, target_id: str) -> Explanation:
-        """Return why a target is in its plan or not, opportunity by opportunity."""
+        """Return why a target is or is not in its plan, opportunity by opportunity."""
         return self._jobs.explanation(self.id, target_id)
 
     def what_if(self, **change: Any) -> Job:
-        """Queue the same question with a change; see ``Jobs.what_if``."""
+        """Queue the same job with a change; see ``Jobs.what_if``."""
         return self._jobs.what_if(self.id, **change)
 
 
 class Jobs(Collection[Job]):
-    """The jobs of the service. A finished one is deleted with its answer, for good."""
+    """The jobs of the service. Deleting a finished one deletes its answer too, for good."""
 
     _name, _shape = "jobs", Job
 
@@ -98,19 +98,19 @@ class Jobs(Collection[Job]):
         label: str | None = None,
         idempotency_key: str | None = None,
     ) -> Job:
-        """Queue a job, once however often the request has to be sent.
+        """Queue one job, even if the request has to be sent several times.
 
         Parameters
         ----------
         scenario
-            A stored one or its id; or the content of a scenario file, or the body of a
-            scenario, which is stored with the job (once, if it was sent before).
+            A stored scenario or its id; or the content of a scenario file or the body of a
+            scenario, which is stored with the job (only once if it was sent before).
         params
-            The solver's own; the others are its defaults.
+            Parameters of the solver; defaults for those left out.
         time_s, memory_mb
-            What the job may use.
+            The job's limits.
         priority
-            0 to 9, 9 being the most urgent.
+            0 to 9; 9 is the most urgent.
         """
         body = question(scenario, time_s, memory_mb, priority, label)
         body |= {"solver": solver, "params": dict(params or {}), "seed": seed}
@@ -134,7 +134,7 @@ class Jobs(Collection[Job]):
         return map(self._own, jobs)
 
     def get(self, job_id: str, /, *, known: Job | None = None) -> Job:
-        """Return one job; ``known`` itself where nothing has changed since it was read."""
+        """Return one job; ``known`` itself if nothing has changed since it was read."""
         etag = known.etag if known else None
         headers = {} if etag is None else {"If-None-Match": etag}
         answer = self._transport.request("GET", self._path(job_id), headers=headers)
@@ -143,13 +143,13 @@ class Jobs(Collection[Job]):
         return self._read(answer.text, answer.headers.get("etag"))
 
     def follow(self, job_id: str) -> Iterator[Job]:
-        """Yield the job as it is, then at each change, until it is final."""
+        """Yield the job as it is, then after each change, until it is final."""
         return follow(self._transport, self._path(job_id), self._read)
 
     def wait(self, job_id: str, timeout_s: float | None = None) -> Job:
-        """Return the job once it has succeeded or was cancelled; see ``Job.wait``."""
+        """Return the job when it has succeeded or was cancelled; see ``Job.wait``."""
         path = self._path(job_id)
-        # A stream of events has no end of its own in sight: only questions can be timed.
+        # A stream of events may last for ever: only polling can keep a time limit.
         states = (
             self.follow(job_id)
             if timeout_s is None
@@ -161,12 +161,12 @@ class Jobs(Collection[Job]):
         return job
 
     def cancel(self, job_id: str) -> Job:
-        """Ask for a job's end. Not sent again where the answer is lost: look at the job then."""
+        """Ask for a job's end. Not resent if the answer is lost: look at the job then."""
         answer = self._transport.request("POST", self._path(job_id, "cancel"))
         return self._read(answer.text, answer.headers.get("etag"))
 
     def rerun(self, job_id: str, *, idempotency_key: str | None = None) -> Job:
-        """Queue the same question again."""
+        """Queue the same job again."""
         return self._queue(self._path(job_id, "rerun"), idempotency_key)
 
     def replan(
@@ -177,13 +177,13 @@ class Jobs(Collection[Job]):
         return self._queue(path, idempotency_key, json=dict(happened))
 
     def timeline(self, job_id: str) -> Timeline:
-        """Return a job's plan, judged; ``not_ready`` before there is one."""
+        """Return a job's plan as judged by the referee; ``not_ready`` before there is one."""
         return self._transport.get(self._path(job_id, "timeline"), Timeline)
 
     def download(self, job_id: str, file: Path | str) -> Path:
-        """Write a timeline to a file, in the form that its suffix names.
+        """Write a timeline to a file, in the format of its suffix.
 
-        The file appears once it is complete; one that was there stays until then.
+        The file appears when it is complete; an existing file stays until then.
         """
         to = Path(file)
         suffix = _OPENMCT if to.name.lower().endswith(_OPENMCT) else to.suffix.lower()
@@ -194,12 +194,12 @@ class Jobs(Collection[Job]):
     def targets(
         self, job_id: str, *, outcome: str | None = None, reason: str | None = None
     ) -> Iterator[TargetOutcome]:
-        """Yield every target of the scenario with what became of it."""
+        """Yield each target of the scenario with its outcome."""
         params = {"outcome": outcome, "reason": reason, "limit": 500}
         return self._transport.pages(self._path(job_id, "targets"), TargetOutcome, params)
 
     def explanation(self, job_id: str, target_id: str) -> Explanation:
-        """Return why a target is in a plan or not, opportunity by opportunity."""
+        """Return why a target is or is not in a plan, opportunity by opportunity."""
         path = self._path(job_id, "targets", target_id, "explanation")
         return self._transport.get(path, Explanation)
 
@@ -213,23 +213,23 @@ class Jobs(Collection[Job]):
         idempotency_key: str | None = None,
         **other: Any,
     ) -> Job:
-        """Queue the question of a job with a change.
+        """Queue a job again with a change.
 
         Parameters
         ----------
         force, forbid
-            Ids of targets, or actions in words, as in ``pins``.
+            Ids of targets, or actions as in ``pins``.
         relax
-            Other values of settings; the ``change`` of a reason fits.
+            New values of settings; the ``change`` of a reason can be used.
         other
-            ``solver``, ``params``, ``seed``, ``limits``, ``priority``, ``label``, where they
-            are not those of the job.
+            ``solver``, ``params``, ``seed``, ``limits``, ``priority``, ``label``, if they
+            differ from those of the job.
         """
         body = {"force": list(force), "forbid": list(forbid), "relax": dict(relax or {}), **other}
         return self._queue(self._path(job_id, "what-if"), idempotency_key, json=body)
 
     def diff(self, before: str | Job, after: str | Job) -> PlanDiff:
-        """Return what the second job's plan has that the first one's has not, and back."""
+        """Return the actions that only one of the plans of two jobs has."""
         first, second = (job.id if isinstance(job, Job) else job for job in (before, after))
         return self._transport.get(self._path(first, "diff", second), PlanDiff)
 
@@ -251,7 +251,7 @@ def question(
     priority: int | None,
     label: str | None,
 ) -> Json:
-    """Return what jobs and comparisons ask for in one way; what is None is left out."""
+    """Return the part of the body that jobs and comparisons share, without fields that are None."""
     if isinstance(scenario, Mapping):
         asked: Json = {"scenario": dict(scenario)}
     else:

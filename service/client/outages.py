@@ -11,7 +11,7 @@ from service.wire.pins import OutageOut as Outage
 
 
 class Outages(Collection[Outage]):
-    """The outages that are stored: scenarios made in their span take them along, and keep them."""
+    """The stored outages: scenarios whose horizon they touch take a copy, and keep it."""
 
     _name, _shape = "outages", Outage
 
@@ -26,7 +26,7 @@ class Outages(Collection[Outage]):
         reason: str | None = None,
         idempotency_key: str | None = None,
     ) -> Outage:
-        """Report that a satellite or a station is out from ``start`` to ``end``."""
+        """Report that a satellite or a station is unavailable from ``start`` to ``end``."""
         body = said(
             satellite_id=satellite_id, station_id=station_id, modes=list(modes),
             start=start, end=end, reason=reason,
@@ -41,6 +41,6 @@ class Outages(Collection[Outage]):
         from_: datetime | None = None,
         to: datetime | None = None,
     ) -> Iterator[Outage]:
-        """Yield the outages that touch a span, newest first."""
+        """Yield the outages that overlap a time span, newest first."""
         span = {"from": from_, "to": to}
         return self._listed(satellite_id=satellite_id, station_id=station_id, **span)

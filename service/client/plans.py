@@ -1,4 +1,4 @@
-"""Plans with a life: drafts that are approved, published and reported on."""
+"""Plans in operations: drafts that are approved, published and reported on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ At = datetime | Literal["now"]
 
 
 class Plans(Collection[Plan]):
-    """The plans of the key's owner. One is deleted for good, unless it is approved or published."""
+    """The plans of the key's owner. Deletion is final; approved and published ones are refused."""
 
     _name, _shape = "plans", Plan
 
@@ -71,7 +71,7 @@ class Plans(Collection[Plan]):
         effective_from: datetime | None = None,
         if_match: str | None = None,
     ) -> Plan:
-        """Put an approved plan in force, in place of what is so for its satellites."""
+        """Put an approved plan in force, replacing the plans in force for its satellites."""
         told = {"reason": reason, "effective_from": effective_from}
         return self._move(plan_id, "published", if_match, **told)
 
@@ -82,11 +82,11 @@ class Plans(Collection[Plan]):
         return self._move(plan_id, "withdrawn", if_match, reason=reason)
 
     def history(self, plan_id: str) -> Iterator[PlanEvent]:
-        """Yield the plan's transitions in their order."""
+        """Yield the plan's transitions in order."""
         return self._transport.pages(self._path(plan_id, "history"), PlanEvent)
 
     def actions(self, plan_id: str, *, satellite_id: str | None = None) -> Iterator[PlanAction]:
-        """Yield the plan's collects and contacts, with what became of them."""
+        """Yield the plan's collects and contacts, with their reported outcomes."""
         wanted = {"satellite_id": satellite_id}
         return self._transport.pages(self._path(plan_id, "actions"), PlanAction, wanted)
 
@@ -100,7 +100,7 @@ class Plans(Collection[Plan]):
         to: datetime | None = None,
         planned: bool | None = None,
     ) -> Iterator[Pass]:
-        """Yield the passes over the plan's stations by AOS, planned or not."""
+        """Yield the passes over the plan's stations in order of AOS, planned or not."""
         wanted = {
             "station_id": station_id, "satellite_id": satellite_id,
             "from": from_, "to": to, "planned": planned,
@@ -114,13 +114,13 @@ class Plans(Collection[Plan]):
         *,
         idempotency_key: str | None = None,
     ) -> Sequence[Execution]:
-        """Report what became of actions: ``{"action_id": …, "outcome": "executed"}``, and so on."""
+        """Report outcomes of actions: ``{"action_id": …, "outcome": "executed"}``, and so on."""
         return self._report(plan_id, idempotency_key, json=[dict(each) for each in executions])
 
     def report_csv(
         self, plan_id: str, data: bytes, *, idempotency_key: str | None = None
     ) -> Sequence[Execution]:
-        """Report what became of actions, as a table with a header."""
+        """Report outcomes of actions, as a table with a header."""
         return self._report(plan_id, idempotency_key, **upload(data, "csv"))
 
     def add_states(
@@ -140,24 +140,24 @@ class Plans(Collection[Plan]):
         return self._add_states(plan_id, idempotency_key, **upload(data, "csv"))
 
     def states(self, plan_id: str) -> Iterator[PlanState]:
-        """Yield telemetry of a plan, newest first."""
+        """Yield the telemetry of a plan, newest first."""
         return self._transport.pages(self._path(plan_id, "states"), PlanState)
 
     def executions(self, plan_id: str) -> Iterator[Execution]:
-        """Yield what was reported, newest first."""
+        """Yield the reported outcomes, newest first."""
         return self._transport.pages(self._path(plan_id, "executions"), Execution)
 
     def replan(self, plan_id: str, *, idempotency_key: str | None = None, **happened: Any) -> Job:
-        """Queue the plan that follows this one; ``happened`` is the body of the call.
+        """Queue the plan that follows this one; ``happened`` is the body of the request.
 
-        ``freeze_until``, ``outages``, ``promises``, ``add_targets``, ``stability`` and the like,
-        as the API takes them; ``now``, ``freeze_until`` and ``horizon_end`` may be aware
-        datetimes. Once the job has succeeded, the draft is ``draft_of(job)``.
+        It takes ``freeze_until``, ``outages``, ``promises``, ``add_targets``, ``stability`` and the
+        like as in the API; ``now``, ``freeze_until`` and ``horizon_end`` may be aware datetimes.
+        When the job has succeeded, its draft is ``draft_of(job)``.
         """
         return self._jobs.replan(plan_id, in_text(happened), idempotency_key=idempotency_key)
 
     def draft_of(self, job: Job) -> Plan:
-        """Return the draft that the job of a replan has left."""
+        """Return the draft created by a replan's job."""
         return self._transport.get(job.links["plan"], Plan)
 
     def changes(self, plan_id: str) -> PlanChanges:

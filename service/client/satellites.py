@@ -15,7 +15,7 @@ from service.wire.satellites import SatelliteOut as Satellite
 
 
 class Satellites(Changeable[Satellite]):
-    """The satellites that are stored. Scenarios keep their copy of one that is deleted."""
+    """The stored satellites. Scenarios keep their copy of a deleted one."""
 
     _name, _shape = "satellites", Satellite
 
@@ -32,10 +32,10 @@ class Satellites(Changeable[Satellite]):
         spacecraft: str | None = None,
         idempotency_key: str | None = None,
     ) -> Satellite:
-        """Store a satellite; its orbit is ``tle``, two lines, ``omm``, keywords, or ``oem``, lines.
+        """Store a satellite, its orbit as ``tle`` (two lines), ``omm`` (keywords) or ``oem`` lines.
 
-        It is of the type ``spacecraft``, an id or the name of one that is built in
-        (``generic_optical`` by default), but for the figures given.
+        Figures that are not given come from the type ``spacecraft``: an id, or the name of a
+        built-in type (``generic_optical`` by default).
         """
         figures = said(agility=agility, sensor=sensor, resources=resources, spacecraft=spacecraft)
         return self._create({"name": name, **_orbit(tle, omm, oem), **figures}, idempotency_key)
@@ -51,7 +51,7 @@ class Satellites(Changeable[Satellite]):
     ) -> Import[ImportedSatellite]:
         """Store the orbits of a file: ``tle``, ``kvn``, ``json``, ``csv`` or ``xml``.
 
-        Records whose catalogue number is known join that satellite, so that importing the
+        A record with a known catalogue number is added to that satellite, so importing the
         same file again changes nothing.
 
         Parameters
@@ -59,9 +59,9 @@ class Satellites(Changeable[Satellite]):
         source, form
             The file, or its content and form.
         reject_all
-            Whether one bad record refuses the file.
+            Whether one bad record rejects the whole file.
         spacecraft
-            Type of the new satellites, ``generic_optical`` by default.
+            Type of new satellites, ``generic_optical`` by default.
         """
         return self._transport.post(
             self._path("import"),
@@ -79,7 +79,7 @@ class Satellites(Changeable[Satellite]):
         return self._listed(norad_cat_id=norad_cat_id)
 
     def elements(self, satellite_id: str) -> Iterator[Elements]:
-        """Yield all element sets of a satellite, the last stored first."""
+        """Yield all element sets of a satellite, most recently stored first."""
         return self._transport.pages(self._path(satellite_id, "elements"), Elements)
 
     def put_elements(
@@ -91,7 +91,7 @@ class Satellites(Changeable[Satellite]):
         oem: Sequence[str] | None = None,
         if_match: str | None = None,
     ) -> Satellite:
-        """Store a further orbit, where the satellite is still as ``if_match`` says."""
+        """Store another orbit; if ``if_match`` is given, only in the state that it names."""
         path, body = self._path(satellite_id, "elements"), _orbit(tle, omm, oem)
         return self._transport.change("PUT", path, Satellite, body, if_match=if_match)
 

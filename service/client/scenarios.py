@@ -1,4 +1,4 @@
-"""Scenarios: frozen questions, and the opportunities they offer."""
+"""Scenarios: frozen planning problems, and their opportunities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.wire.scenarios import ScenarioSummary
 
 
 class Scenarios(Collection[ScenarioSummary]):
-    """The scenarios that are stored. One that a job has cannot be deleted."""
+    """The stored scenarios. One that is used by a job cannot be deleted."""
 
     _name, _shape = "scenarios", ScenarioSummary
 
@@ -29,12 +29,12 @@ class Scenarios(Collection[ScenarioSummary]):
         idempotency_key: str | None = None,
         **optional: Any,
     ) -> Scenario:
-        """Freeze a question. The same content again is the scenario that is there.
+        """Freeze a scenario. If the same content is stored already, return that scenario.
 
         Parameters
         ----------
         start, end
-            With their offset from UTC; an instant without one is refused.
+            With a UTC offset; an instant without one is refused.
         optional
             ``name``, ``use_resources``, ``dynamics``, ``collect_spacing_s`` and so on.
         """
@@ -56,7 +56,7 @@ class Scenarios(Collection[ScenarioSummary]):
         satellite_id: str | None = None,
         station_id: str | None = None,
     ) -> Iterator[ScenarioSummary]:
-        """Yield the scenarios, newest first, without their pins; ``name`` may be a part of one."""
+        """Yield the scenarios, newest first, without their pins; ``name`` may be part of a name."""
         return self._listed(name=name, satellite_id=satellite_id, station_id=station_id)
 
     def get(self, scenario_id: str, /) -> Scenario:
@@ -64,7 +64,7 @@ class Scenarios(Collection[ScenarioSummary]):
         return self._transport.get(self._path(scenario_id), Scenario)
 
     def file(self, scenario_id: str) -> Json:
-        """Return the self-contained scenario file, which ``slewline solve`` takes too."""
+        """Return the self-contained scenario file, which ``slewline solve`` also takes."""
         path = self._path(scenario_id)
         answer: Json = self._transport.request("GET", path, params={"expand": True}).json()
         return answer
@@ -77,9 +77,9 @@ class Scenarios(Collection[ScenarioSummary]):
         target_id: str | None = None,
         satellite_id: str | None = None,
     ) -> Iterator[Opportunity]:
-        """Yield what could be done before any planning, in order of start.
+        """Yield the scenario's opportunities, before any planning, in order of start.
 
-        The service computes it at the first call and asks to come back until it has.
+        The service computes them at the first call; until they are ready, the client asks again.
         """
         wanted = {"kind": kind, "target_id": target_id, "satellite_id": satellite_id, "limit": 500}
         path = self._path(scenario_id, "opportunities")

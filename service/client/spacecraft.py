@@ -11,10 +11,10 @@ from service.wire.spacecraft import SpacecraftOut as SpacecraftType
 
 
 class SpacecraftTypes(Changeable[SpacecraftType]):
-    """The types that satellites may be made from: one's own, then those that are built in.
+    """The types that satellites may be made from: the user's own, then the built-in ones.
 
-    Those have their names for ids. Satellites stay as they are when their type is changed or
-    deleted.
+    The id of a built-in type is its name. Satellites stay as they are when their type is
+    changed or deleted.
     """
 
     _name, _shape = "spacecraft", SpacecraftType
@@ -28,6 +28,6 @@ class SpacecraftTypes(Changeable[SpacecraftType]):
         resources: str | Mapping[str, Any] | None = None,
         idempotency_key: str | None = None,
     ) -> SpacecraftType:
-        """Store a type; what is left out is that of ``generic_optical``."""
+        """Store a type; ``generic_optical`` supplies what is left out."""
         body = said(name=name, agility=agility, sensor=sensor, resources=resources)
         return self._create(body, idempotency_key)

@@ -1,4 +1,4 @@
-"""Catalogues of targets, and how far their targets have come."""
+"""Catalogues of targets, and the progress of their targets."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from service.wire.target_lives import TargetLifeOut as TargetLife
 
 
 class TargetCatalogs(Changeable[TargetCatalog]):
-    """The target catalogues that are stored. Scenarios keep their copy of one that is deleted.
+    """The stored target catalogues. Scenarios keep their copy of a deleted one.
 
-    What can be changed is the ``name``, and by target the ``rewards`` that images earn from now on.
+    The ``name`` can be changed, and by target the ``rewards`` that images earn from now on.
     """
 
     _name, _shape = "target-catalogs", TargetCatalog
@@ -35,7 +35,7 @@ class TargetCatalogs(Changeable[TargetCatalog]):
         Parameters
         ----------
         name
-            Of the catalogue; a GeoJSON or JSON file that has one of its own keeps it.
+            The catalogue's name, unless a GeoJSON or JSON file has one of its own.
         targets, form
             Targets as mappings, each with ``id``, ``lat_deg``, ``lon_deg``; or a file, or its
             content and form: ``csv``, ``geojson`` or ``json``.
@@ -54,7 +54,7 @@ class TargetCatalogs(Changeable[TargetCatalog]):
 
 
 class Targets:
-    """The targets of all catalogues, with how far each has come."""
+    """The targets of all catalogues, with the progress of each."""
 
     def __init__(self, transport: Transport):
         self._transport = transport

@@ -1,4 +1,4 @@
-"""Requests that outlive lost connections: sent again where that is safe, and only there."""
+"""Requests that survive lost connections: resent if, and only if, that is safe."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ _PAUSE: Final = wait_random_exponential(multiplier=0.5, max=10.0)
 class Transport:
     """Sends requests of one client.
 
-    A request is sent again after a lost connection, 429, 502, 503 and 504, where a repeat
-    does no harm: GET, PUT and DELETE without ``If-Match``, and POST with an idempotency key.
-    Any request is where the service was never reached. The pauses grow, are partly chance,
+    A request is resent after a lost connection, 429, 502, 503 and 504 if repeating it is
+    harmless: GET, PUT and DELETE without ``If-Match``, and POST with an idempotency key.
+    Any request is resent if the service was never reached. Pauses grow, are partly random,
     and never end before ``Retry-After``.
     """
 
@@ -62,21 +62,21 @@ class Transport:
         patience_s: float | None = None,
         **body: Any,
     ) -> httpx.Response:
-        """Return the answer to a request, which is a success or 304.
+        """Return the answer to a request: a success or 304.
 
         Parameters
         ----------
         patience_s
-            For how long it is tried again, at most.
+            How long to try again, at most.
         body
             ``json`` or ``content``.
 
         Raises
         ------
         ServiceError
-            Where the service refuses.
+            If the service refuses.
         Unreachable
-            Where no answer came.
+            If no answer comes.
         """
         sent = httpx.Headers(headers)
         given = said(**(params or {}))
@@ -88,7 +88,7 @@ class Transport:
         return self._again(send, is_repeatable(method, sent), patience_s)
 
     def get(self, path: str, shape: type[M], params: Params | None = None) -> M:
-        """Return what is there."""
+        """Return what is at a path."""
         return held(shape, self.request("GET", path, params=params))
 
     def post(
@@ -100,18 +100,18 @@ class Transport:
         headers: Mapping[str, str] | None = None,
         **rest: Any,
     ) -> M:
-        """Return what was created, once however often the request has to be sent."""
+        """Return what was created: once, even if the request has to be sent several times."""
         key = {"Idempotency-Key": idempotency_key or secrets.token_hex(16)}
         return held(shape, self.request("POST", path, headers={**(headers or {}), **key}, **rest))
 
     def change(
         self, method: str, path: str, shape: type[M], body: Json, *, if_match: str | None
     ) -> M:
-        """Return what is there once it was changed, in the state that ``if_match`` names."""
+        """Return what is at a path after a change to the state that ``if_match`` names."""
         return held(shape, self.request(method, path, json=body, headers=only_if(if_match)))
 
     def delete(self, path: str, *, if_match: str | None = None) -> None:
-        """Delete what is there; only in the state that ``if_match`` names, where it is given."""
+        """Delete what is at a path; only in the state that ``if_match`` names, if given."""
         attempts = 0
         headers = only_if(if_match)
 
@@ -120,13 +120,13 @@ class Transport:
             attempts += 1
             answer = self.http.delete(path, headers=headers)
             if answer.status_code == 404 and attempts > 1:
-                return  # by the attempt before, whose answer was lost
+                return  # deleted by an earlier attempt, whose answer was lost
             checked(answer)
 
         self._again(send, is_repeatable("DELETE", httpx.Headers(headers)))
 
     def pages(self, path: str, shape: type[M], params: Params | None = None) -> Iterator[M]:
-        """Yield all of a list, page by page as they are asked for."""
+        """Yield all items of a list, fetching pages as needed."""
         cursor: str | None = None
         while True:
             answer = self.request("GET", path, params={**(params or {}), "cursor": cursor})
@@ -140,13 +140,13 @@ class Transport:
     def stream(
         self, path: str, headers: Mapping[str, str], *, silence_s: float
     ) -> Iterator[httpx.Response]:
-        """Yield an answer that is still coming; it ends where nothing comes for so long."""
+        """Yield an answer that is still coming; it fails after ``silence_s`` without data."""
         timeout = httpx.Timeout(**{**self.http.timeout.as_dict(), "read": silence_s})
         with self.http.stream("GET", path, headers=headers, timeout=timeout) as answer:
             yield checked(answer)
 
     def save(self, path: str, file: Path) -> None:
-        """Write what is there to a file, which appears whole or not at all."""
+        """Write what is at a path to a file, which appears complete or not at all."""
 
         def fetch() -> None:
             with self.http.stream("GET", path) as answer, written_whole(file) as out:
@@ -184,17 +184,17 @@ def path_of(*parts: str) -> str:
 
 
 def only_if(if_match: str | None) -> dict[str, str]:
-    """Return the header that allows a change in one state alone; none where any will do."""
+    """Return the header that allows a change in one state only; none if any state will do."""
     return {} if if_match is None else {"If-Match": if_match}
 
 
 def said(**fields: Any) -> Json:
-    """Return what is said, instants as text; nothing is said of what is None."""
+    """Return the fields that are not None, with instants as text."""
     return in_text({name: value for name, value in fields.items() if value is not None})
 
 
 def in_text(fields: Mapping[str, Any]) -> Json:
-    """Return the same with its instants as text."""
+    """Return the fields with instants as text."""
     return {
         name: instant_text(value) if isinstance(value, datetime) else value
         for name, value in fields.items()
@@ -202,19 +202,19 @@ def in_text(fields: Mapping[str, Any]) -> Json:
 
 
 def is_repeatable(method: str, headers: httpx.Headers) -> bool:
-    """Return whether the service may get this request twice without harm.
+    """Return whether the service may receive this request twice without harm.
 
     >>> is_repeatable("POST", httpx.Headers()), is_repeatable("GET", httpx.Headers())
     (False, True)
     """
-    # What If-Match named is gone once the first attempt has been obeyed.
+    # After a first successful attempt, the state that If-Match names no longer exists.
     if method in ("GET", "PUT", "DELETE"):
         return "If-Match" not in headers
     return "Idempotency-Key" in headers
 
 
 def checked(answer: httpx.Response) -> httpx.Response:
-    """Return an answer that is a success or 304; raise what any other one tells."""
+    """Return an answer that is a success or 304; otherwise raise its error."""
     if answer.is_success or answer.status_code == 304:
         return answer
     answer.read()
@@ -222,14 +222,14 @@ def checked(answer: httpx.Response) -> httpx.Response:
 
 
 def held(shape: type[M], answer: httpx.Response) -> M:
-    """Return what an answer holds, with its ETag where the shape has one."""
+    """Return the content of an answer, with its ETag if the shape has one."""
     request = answer.request
     found = parsed(shape, answer.content, f"{request.method} {request.url.path}")
     return found.with_etag(answer.headers.get("etag")) if isinstance(found, Stored) else found
 
 
 def parsed(shape: type[M], text: str | bytes, what: str) -> M:
-    """Return what a text holds; ``UnexpectedAnswer`` where it is something else than ``what``."""
+    """Return a text parsed as ``shape``; ``UnexpectedAnswer`` naming ``what`` if it is not one."""
     try:
         return read(shape, text)
     except ValidationError as error:
@@ -238,7 +238,7 @@ def parsed(shape: type[M], text: str | bytes, what: str) -> M:
 
 @contextmanager
 def written_whole(file: Path) -> Iterator[IO[bytes]]:
-    """Yield a file to write that takes its name once it is complete."""
+    """Yield a file to write to, which gets its name only when it is complete."""
     part = file.with_name(f".{file.name}.{secrets.token_hex(4)}.part")
     try:
         with part.open("xb") as out:
@@ -255,7 +255,7 @@ def _is_worth_another(error: BaseException, repeatable: bool) -> bool:
 
 
 def _pause(attempt: RetryCallState) -> float:
-    """Return seconds until the next attempt: what was asked for, and a random share on top."""
+    """Return the seconds until the next attempt: what was asked for, plus a random share."""
     error = attempt.outcome.exception() if attempt.outcome else None
     asked_s = error.retry_after_s if isinstance(error, ServiceError) else None
     return (asked_s or 0.0) + _PAUSE(attempt)

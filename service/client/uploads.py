@@ -1,4 +1,4 @@
-"""Files on their way to the service: their bytes, and the media type that names their form."""
+"""Files to send to the service: their bytes, and the media type that names their form."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _SUFFIXES: Final = {
 
 
 def upload(source: Source, form: str | None) -> dict[str, Any]:
-    """Return how a file is sent: its content, and the header that tells its form.
+    """Return how to send a file: its content, and the header that names its form.
 
     Parameters
     ----------
     form
-        A name of ``MEDIA_TYPES``; of a ``Path`` the suffix tells it.
+        A key of ``MEDIA_TYPES``; None if the suffix of a ``Path`` tells it.
 
     >>> upload("id,lat_deg,lon_deg", "csv")
     {'content': b'id,lat_deg,lon_deg', 'headers': {'Content-Type': 'text/csv'}}

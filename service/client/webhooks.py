@@ -1,4 +1,4 @@
-"""Webhooks: where the service tells the ends of jobs."""
+"""Webhooks: addresses that the service notifies when jobs end."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from service.wire.webhooks import WebhookOut
 
 
 class Webhook(WebhookOut):
-    """A webhook. Only a new one has its ``secret``, which signs what it sends."""
+    """A webhook. Only a newly created one has its ``secret``, which signs messages."""
 
     secret: str | None = None
 
 
 class Webhooks(Collection[Webhook]):
-    """The webhooks of the key's owner. Nothing more is sent to one that is deleted."""
+    """The webhooks of the key's owner. A deleted one receives nothing more."""
 
     _name, _shape = "webhooks", Webhook
 
@@ -29,15 +29,15 @@ class Webhooks(Collection[Webhook]):
         name: str | None = None,
         idempotency_key: str | None = None,
     ) -> Webhook:
-        """Have the ends of jobs told to an address; by default all of them."""
+        """Register an address to be notified of ``events``; by default of every end of a job."""
         asked = None if events is None else list(events)
         return self._create(said(url=url, events=asked, name=name), idempotency_key)
 
     def test(self, webhook_id: str, *, idempotency_key: str | None = None) -> Delivery:
-        """Have a test event sent."""
+        """Send a test event."""
         path = self._path(webhook_id, "test")
         return self._transport.post(path, Delivery, idempotency_key=idempotency_key)
 
     def deliveries(self, webhook_id: str) -> Iterator[Delivery]:
-        """Yield what was sent, newest first."""
+        """Yield the messages sent, newest first."""
         return self._transport.pages(self._path(webhook_id, "deliveries"), Delivery)

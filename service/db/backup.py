@@ -1,4 +1,4 @@
-"""A copy of a SQLite database that is in use: whole, of one moment, and checked."""
+"""A copy of a SQLite database in use: complete, consistent, and checked."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ class CannotBackUp(Exception):
 
 
 def back_up(database_url: str, file: Path) -> None:
-    """Copy the database into a new file, which appears under its name once it is complete.
+    """Copy the database to a new file, which gets its name only when it is complete.
 
     Jobs, queue and keys are in one file and copied in one transaction. Writers do not wait.
 
     Raises
     ------
     CannotBackUp
-        Where it is no SQLite database, where the file exists, or where the copy is not sound.
+        If it is not a SQLite database, the file exists, or the copy is damaged.
     """
     source = _source(database_url)
     if file.exists():
         raise CannotBackUp(f"{file} exists and is not overwritten.")
     part = file.with_name(file.name + ".part")
     try:
-        # It holds what the database holds: for its owner alone.
+        # The copy holds the whole database, so only its owner may read it.
         os.close(os.open(part, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o600))
         with closing(sqlite3.connect(source)) as origin, closing(sqlite3.connect(part)) as copy:
             origin.backup(copy)
-            # One file, with no journal that could be left behind or taken for another's.
+            # A single file, without a journal that could be lost or confused with another's.
             copy.execute("PRAGMA journal_mode = DELETE")
             _check(copy)
         _sync(part)

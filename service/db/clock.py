@@ -1,4 +1,4 @@
-"""The database's clock: leases and heartbeats of several machines are judged by one clock."""
+"""The database's clock: one clock for the leases and heartbeats of several machines."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from service.db.columns import UtcDateTime
 
 
 class utc_now(FunctionElement[datetime]):  # noqa: N801 - reads as an SQL function
-    """``utc_now()`` or ``utc_now(offset_s)``: this instant, or so many seconds from it.
+    """``utc_now()`` or ``utc_now(offset_s)``: the present instant, plus an offset in seconds.
 
-    It moves on within a transaction, so that one that waited for a lock sees the later time.
+    It advances within a transaction, so that one that waited for a lock sees the later time.
     """
 
     type = UtcDateTime()
@@ -28,13 +28,13 @@ class utc_now(FunctionElement[datetime]):  # noqa: N801 - reads as an SQL functi
 
 
 def now(session: Session, offset_s: float = 0.0) -> datetime:
-    """Return the database's time, or so many seconds from it."""
+    """Return the database's time, plus an offset in seconds."""
     return session.execute(sa.select(utc_now(offset_s))).scalar_one()
 
 
 @compiles(utc_now, "sqlite")
 def _sqlite(element: utc_now, compiler: SQLCompiler, **kw: Any) -> str:
-    # Six digits of fraction: that is how rows hold instants, and text compares as text.
+    # Six decimals of the second, as rows store instants, since SQLite compares them as text.
     offset = compiler.process(element.clauses, **kw)
     return f"(strftime('%Y-%m-%d %H:%M:%f', 'now', {offset} || ' seconds') || '000')"
 
@@ -46,7 +46,7 @@ def _postgresql(element: utc_now, compiler: SQLCompiler, **kw: Any) -> str:
 
 
 class seconds_between(FunctionElement[float]):  # noqa: N801 - reads as an SQL function
-    """``seconds_between(start, end)``: how long after the one instant the other is."""
+    """``seconds_between(start, end)``: the seconds from one instant to another."""
 
     type = sa.Double()
     inherit_cache = True
@@ -59,7 +59,7 @@ class seconds_between(FunctionElement[float]):  # noqa: N801 - reads as an SQL f
 
 @compiles(seconds_between, "sqlite")
 def _sqlite_between(element: seconds_between, compiler: SQLCompiler, **kw: Any) -> str:
-    # A Julian day is good to 0.04 ms, and SQLite's clock to 1 ms.
+    # A Julian day is accurate to 0.04 ms, and SQLite's clock to 1 ms.
     start, end = (compiler.process(clause, **kw) for clause in element.clauses)
     return f"((julianday({end}) - julianday({start})) * 86400.0)"
 

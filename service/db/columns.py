@@ -1,4 +1,4 @@
-"""What all tables share: how they are called, their types of columns, and who was made when."""
+"""What all tables share: naming, column types, and base classes with ids and times."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Json = dict[str, Any]
 
 
 class UtcDateTime(sa.TypeDecorator[datetime]):
-    """An aware UTC instant on every database (SQLite itself forgets the zone)."""
+    """An aware UTC instant on every database (SQLite itself drops the zone)."""
 
     impl = sa.DateTime(timezone=True)
     cache_ok = True
@@ -29,16 +29,17 @@ class UtcDateTime(sa.TypeDecorator[datetime]):
         return value.astimezone(UTC)
 
     def process_result_value(self, value: datetime | None, dialect: sa.Dialect) -> datetime | None:
-        """Give back an aware instant."""
+        """Return an aware instant."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
 class Row(DeclarativeBase):
-    """Base of all rows. Unless it says otherwise, ``ElementSetRow`` is one of ``element_set``."""
+    """Base of all rows. By default, the table of ``ElementSetRow`` is ``element_set``."""
 
-    type_annotation_map = {Json: sa.JSON, datetime: UtcDateTime, str: sa.Text}  # noqa: RUF012 - as SQLAlchemy reads it
+    # SQLAlchemy reads this from the class.
+    type_annotation_map = {Json: sa.JSON, datetime: UtcDateTime, str: sa.Text}  # noqa: RUF012
 
     @declared_attr.directive
     def __tablename__(cls) -> str:  # noqa: N805 - as SQLAlchemy calls it
@@ -47,7 +48,7 @@ class Row(DeclarativeBase):
 
 
 class Made(Row):
-    """A thing with an id of its own, which it has from the moment that it is made."""
+    """A row with an id of its own, assigned on construction."""
 
     __abstract__ = True
 
@@ -59,19 +60,19 @@ class Made(Row):
 
 
 class Kept(Made):
-    """A thing whose row stays when it is deleted: scenarios and plans name it."""
+    """A row that is kept after deletion, because scenarios and plans refer to it."""
 
     __abstract__ = True
 
     deleted_at: Mapped[datetime | None]
 
     def delete(self) -> None:
-        """Note that it is deleted now."""
+        """Mark it as deleted now."""
         self.deleted_at = datetime.now(UTC)
 
 
 class Owned(Made):
-    """A thing of an owner's."""
+    """A row that belongs to an owner."""
 
     __abstract__ = True
 
@@ -79,7 +80,7 @@ class Owned(Made):
 
 
 class Reported(Row):
-    """What somebody has reported of a plan. Rows are added, never changed."""
+    """A report by somebody about a plan. Rows are added, never changed."""
 
     __abstract__ = True
 

@@ -1,4 +1,4 @@
-"""Errors of the database that are nobody's fault here and pass: it is away, full or read-only."""
+"""Temporary database errors, no fault of the service: unreachable, full or read-only."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ _POSTGRESQL: Final = {
 
 
 def why_unavailable(error: BaseException) -> str | None:
-    """Return why the database could not serve, or None for an error that will not pass.
+    """Return why the database could not serve, or None for a lasting error.
 
-    The same work may be tried again: nothing of its transaction was kept, unless the connection
-    was lost in the middle of its commit.
+    The same work may be tried again: its transaction left no trace, unless the connection was
+    lost during its commit.
     """
     if isinstance(error, sa.exc.TimeoutError):  # no free connection
         return _BUSY
@@ -50,12 +50,12 @@ def why_unavailable(error: BaseException) -> str | None:
         return None
     driver_error = error.orig
     if isinstance(driver_error, sqlite3.Error):
-        # The low byte is the error; what stands above it are its kinds.
+        # The low byte is the error; the higher bits are its variants.
         code = getattr(driver_error, "sqlite_errorcode", None)
         return None if code is None else _SQLITE.get(code & 0xFF)
     state = getattr(driver_error, "sqlstate", None)
     if state is None:
-        # The driver itself speaks, not the server.
+        # The error comes from the driver itself, not from the server.
         lost = error.connection_invalidated or isinstance(error, sa.exc.OperationalError)
         return _AWAY if lost else None
     return _POSTGRESQL.get(state) or _POSTGRESQL.get(state[:2])

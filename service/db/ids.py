@@ -1,4 +1,4 @@
-"""Identifiers: UUIDv7 strings, which sort by the time they were made."""
+"""Identifiers: UUIDv7 strings, which sort by creation time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _last = 0
 
 
 def new_id() -> str:
-    """Return a fresh UUIDv7; within one process each is greater than the one before.
+    """Return a new UUIDv7; within one process, each is greater than the one before.
 
     48 bits of milliseconds, 12 bits of the millisecond's fraction (RFC 9562, method 3 of
     section 6.2), then 62 random bits.
@@ -28,6 +28,6 @@ def _next_stamp() -> int:
     nanoseconds = time.time_ns()
     stamp = (nanoseconds // 1_000_000) << 12 | (nanoseconds % 1_000_000) * 4096 // 1_000_000
     with _lock:
-        # Two ids in the same 244 ns, or a clock that was set back, still count upwards.
+        # Keep counting up for two ids within 244 ns, or after the clock was set back.
         _last = max(stamp, _last + 1)
         return _last

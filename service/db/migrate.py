@@ -1,4 +1,4 @@
-"""Bring a database to the schema of this version; safe to call from many processes at once."""
+"""Bring a database to this version's schema; many processes may call it at once."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _ADVISORY_LOCK = 0x736C_6577
 def upgrade(database_url: str) -> None:
     """Create or update the schema in one transaction.
 
-    The second of two processes waits for the first (SQLite's write lock, an advisory lock on
-    PostgreSQL) and then finds nothing left to do.
+    If two processes call it, the second waits for the first (SQLite's write lock, an advisory
+    lock on PostgreSQL) and then has nothing to do.
     """
-    # A change of a large table takes as long as it takes, and so does the turn before.
+    # No timeout: changing a large table may take long, as may waiting for another process.
     engine = make_engine(database_url, timeout_s=None)
     try:
         with engine.begin() as connection:
@@ -32,7 +32,7 @@ def upgrade(database_url: str) -> None:
 
 
 def config_on(connection: sa.Connection) -> Config:
-    """Return what Alembic needs to work on a connection, in its transaction."""
+    """Return the Alembic configuration for working on a connection, in its transaction."""
     config = Config()
     folder = Path(migrations.__file__).parent
     # Alembic reads "%" in options as interpolation.

@@ -1,7 +1,7 @@
-"""PostgreSQL: no call waits for ever, on whichever side it is that has gone silent.
+"""PostgreSQL: no call waits for ever, whichever side has gone silent.
 
-A server that refuses or breaks connections says so. One that accepts them and never answers
-does not (it is frozen, or its disk is), nor does a network that swallows packets.
+A server that refuses or breaks connections reports it. A server that accepts them and never
+answers (it or its disk is frozen) does not, nor does a network that drops packets.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ CONNECT_WITHIN_S: Final = 5
 
 _LATER_THAN_SERVER_S: Final = 2.0
 _IDLE_IN_TRANSACTION_S: Final = 60
-# TCP gives a peer up that sends nothing, not even acknowledgements, for about this long.
+# TCP gives up on a peer that sends nothing, not even acknowledgements, for about this long.
 _SILENCE_S: Final = 15
 
 
 def make_postgresql_engine(
     url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S, **options: Any
 ) -> sa.Engine:
-    """Return an engine whose calls end: with an answer, or with an ``OperationalError``.
+    """Return an engine whose calls always end, with an answer or an ``OperationalError``.
 
     Parameters
     ----------
     url
-        SQLAlchemy URL. What its query says of connections goes before what is set here.
+        SQLAlchemy URL. Connection options in its query override those set here.
     timeout_s
-        How long a statement may take; the server ends it then, and a little later we no longer
-        wait. None for as long as it takes.
+        Time limit of a statement, enforced by the server; the client stops waiting a little
+        later. None for no limit.
     options
-        More for ``sa.create_engine``.
+        Further options for ``sa.create_engine``.
     """
     address = sa.make_url(url)
     engine = sa.create_engine(url, **{"pool_pre_ping": True, **options})
@@ -65,7 +65,7 @@ _SILENCE: Final = {
 
 
 def _session(timeout_s: float | None) -> str:
-    """Return what the server is told: to notice as well when we have gone, and free our locks."""
+    """Return options that make the server, too, notice a lost client and free its locks."""
     settings = {f"tcp_{name.removeprefix('tcp_')}": value for name, value in _SILENCE.items()}
     if timeout_s is not None:
         settings["statement_timeout"] = round(timeout_s * 1000)
@@ -74,23 +74,23 @@ def _session(timeout_s: float | None) -> str:
 
 
 class _PatientOnlySoLong(psycopg.Connection[Any]):
-    """A connection that is given up when the server does not answer.
+    """A connection that is given up if the server does not answer.
 
-    Neither the server's own time limits nor TCP notice a server that is frozen: its kernel goes
-    on acknowledging what arrives.
+    Neither the server's own time limits nor TCP notice a frozen server: its kernel keeps
+    acknowledging what arrives.
     """
 
     answer_within_s: float | None = None
     _is_listening = False
 
     def wait(self, gen: Any, interval: float = 0.1, timeout: float | None = None) -> Any:
-        """Wait for the server, but not for ever."""
+        """Wait for the server, up to the time limit."""
         if timeout is not None or self.answer_within_s is None or self._is_listening:
             return super().wait(gen, interval, timeout)
         try:
             return super().wait(gen, interval, self.answer_within_s)
         except _WaitTimeout:
-            # What it may yet say would be taken for the answer to the next question.
+            # A late answer would be taken for the answer to the next query.
             self.pgconn.finish()
             raise psycopg.OperationalError(
                 f"the server has not answered for {self.answer_within_s:g} s"
@@ -99,7 +99,7 @@ class _PatientOnlySoLong(psycopg.Connection[Any]):
     def notifies(
         self, *, timeout: float | None = None, stop_after: int | None = None
     ) -> Generator[psycopg.Notify]:
-        """Yield notifications; between them there may well be silence."""
+        """Yield notifications; long silence between them is normal."""
         self._is_listening = True
         try:
             yield from super().notifies(timeout=timeout, stop_after=stop_after)

@@ -1,7 +1,7 @@
 """All tables on one page.
 
-Ids are UUIDv7 strings, instants are UTC. Inputs are never changed under a scenario that
-uses them: a scenario stores its whole content.
+Ids are UUIDv7 strings, instants are UTC. A scenario stores its whole content, so later
+changes of its inputs do not affect it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from service.db.columns import Json, Kept, Made, Owned, Reported, Row
 
 
 class SatelliteRow(Kept):
-    """A satellite; its element sets stand in their own table, newest epoch in force."""
+    """A satellite; its element sets are in their own table, the newest epoch in force."""
 
     name: Mapped[str]
     norad_cat_id: Mapped[int] = mapped_column(sa.BigInteger, index=True)
@@ -34,7 +34,7 @@ class SpacecraftRow(Kept):
 
 
 class ElementSetRow(Made):
-    """One element set of a satellite, as it came (``tle`` or ``omm``), never changed."""
+    """One element set of a satellite, as received (``tle`` or ``omm``), never changed."""
 
     satellite_id: Mapped[str] = mapped_column(sa.ForeignKey("satellite.id"), index=True)
     epoch: Mapped[datetime]
@@ -42,14 +42,14 @@ class ElementSetRow(Made):
 
 
 class GroundStationRow(Kept):
-    """A ground station; ``body`` is what its POST takes, defaults filled in."""
+    """A ground station; ``body`` is the body of its POST with defaults filled in."""
 
     name: Mapped[str]
     body: Mapped[Json]
 
 
 class OutageRow(Kept):
-    """A span in which a satellite or a ground station is out."""
+    """A time span in which a satellite or a ground station is unavailable."""
 
     __table_args__ = (sa.Index("ix_outage_end", "end"),)
 
@@ -79,9 +79,9 @@ class TargetRow(Row):
 
 
 class OrderRow(Owned):
-    """An order that came over STAPI; its id is that of its target.
+    """An order placed through STAPI; its id is that of its target.
 
-    ``target`` is that target as it was ordered, ``sent`` what the order said.
+    ``target`` is the target as ordered, ``sent`` the content of the order.
     """
 
     __tablename__ = "stapi_order"
@@ -94,7 +94,7 @@ class OrderRow(Owned):
 
 
 class ScenarioRow(Made):
-    """A frozen question. ``content`` is the self-contained scenario file; ``sha256`` its hash."""
+    """A frozen scenario. ``content`` is the self-contained scenario file; ``sha256`` its hash."""
 
     sha256: Mapped[str] = mapped_column(sa.String(64), unique=True)
     name: Mapped[str | None]
@@ -103,14 +103,14 @@ class ScenarioRow(Made):
 
 
 class ScenarioOwnerRow(Row):
-    """Who may see a scenario that came with a job of its own; without any, everybody may."""
+    """An owner who may see a scenario sent with a job; without any row, everybody may."""
 
     scenario_id: Mapped[str] = mapped_column(sa.ForeignKey("scenario.id"), primary_key=True)
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
 
 
 class ScenarioPartRow(Row):
-    """A satellite or a ground station of a scenario: lists are narrowed by it."""
+    """A satellite or a ground station of a scenario, by which lists are filtered."""
 
     part_id: Mapped[str] = mapped_column(primary_key=True)
     scenario_id: Mapped[str] = mapped_column(
@@ -120,9 +120,9 @@ class ScenarioPartRow(Row):
 
 
 class ForecastRow(Owned):
-    """A forecast of clear skies; ``block`` is what it says, compressed (`forecasts.fields`).
+    """A forecast of clear skies; ``block`` has its values, compressed (`forecasts.fields`).
 
-    ``summary`` is what readers are told of its size and of how it was read.
+    ``summary`` tells readers its size and how it was read.
     """
 
     owner: Mapped[str] = mapped_column(sa.String(64), index=True)
@@ -145,7 +145,7 @@ class OpportunitySetRow(Row):
 
 
 class BoundRow(Row):
-    """The best proven bound of a scenario so far, whichever job found it."""
+    """The best proven bound for a scenario so far, whichever job found it."""
 
     __tablename__ = "scenario_bound"
 
@@ -162,14 +162,14 @@ class JobRow(Made):
     ``dispatch`` counts how often it was handed to the queue; ``run`` counts starts and
     is the fencing token: only the holder of the current run may renew or finish.
     ``lost_runs`` counts the runs whose worker died.
-    ``what_if_of`` is the job that this one varies, and ``change`` says how.
-    ``request_id`` names the request that it came with, for the logs of its worker.
-    ``traceparent`` names the trace that the job was queued in, where there is one (W3C).
+    ``what_if_of`` is the job that this one varies, ``change`` the variation.
+    ``request_id`` is the request that submitted it, for the logs of its worker.
+    ``traceparent`` is the trace in which the job was queued, if there is one (W3C).
     ``version`` grows with every visible change and is the job's ETag.
-    ``validity`` and ``warnings`` repeat what the head of its timeline says.
+    ``validity`` and ``warnings`` repeat those in the head of its timeline.
     """
 
-    # A filtered list is read in order of the ids, and ends with its page.
+    # Lets a filtered list be read in order of ids, and only up to the end of its page.
     __table_args__ = tuple(
         sa.Index(f"ix_job_{column}_id", column, "id")
         for column in ("scenario_id", "tenant", "state", "label")
@@ -206,9 +206,9 @@ class JobRow(Made):
 
 
 class JobResultRow(Row):
-    """That a job has an answer, written in the transaction that ends it, with all its blocks.
+    """Marks that a job has an answer; written with all its blocks as the job ends.
 
-    ``figures`` repeats the numbers of the timeline that tables show.
+    ``figures`` repeats the timeline's numbers for tables.
     """
 
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job.id"), primary_key=True)
@@ -249,10 +249,10 @@ class ComparisonRunRow(Row):
 
 
 class IdempotencyKeyRow(Row):
-    """The answer that a caller's ``Idempotency-Key`` stands for, for as long as it is kept.
+    """The stored answer for a caller's ``Idempotency-Key``, for as long as it is kept.
 
-    ``request_sha256`` tells the same request from another one. ``answer`` is its status,
-    headers and body; it is set in the transaction that stores what the request created.
+    ``request_sha256`` distinguishes a repeat of the request from another one. ``answer`` is
+    status, headers and body, set in the transaction that stores what the request created.
     """
 
     tenant: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
@@ -263,7 +263,7 @@ class IdempotencyKeyRow(Row):
 
 
 class OwnerUsageRow(Row):
-    """How much an owner has had stored: what it has sent, and what its jobs have found."""
+    """How much is stored for an owner: what it has sent, and what its jobs have found."""
 
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
     num_rows: Mapped[int] = mapped_column(sa.BigInteger)
@@ -271,7 +271,7 @@ class OwnerUsageRow(Row):
 
 
 class WorkerRow(Row):
-    """A worker's heartbeat; readiness asks for a recent one."""
+    """A worker's heartbeat; the service is ready if there is a recent one."""
 
     id: Mapped[str] = mapped_column(sa.String(128), primary_key=True)
     started_at: Mapped[datetime]
@@ -279,7 +279,7 @@ class WorkerRow(Row):
 
 
 class ApiKeyRow(Row):
-    """An API key: all but its token, of which only a digest is kept."""
+    """An API key without its token, of which only a digest is kept."""
 
     id: Mapped[str] = mapped_column(sa.String(12), primary_key=True)
     name: Mapped[str] = mapped_column(sa.String(64))
@@ -292,7 +292,7 @@ class ApiKeyRow(Row):
 
 
 class AuditEventRow(Row):
-    """One change of one object. Triggers of the database refuse to change or delete a row."""
+    """One change of one object. Database triggers prevent changing or deleting a row."""
 
     id: Mapped[str] = mapped_column(sa.String(36), primary_key=True)
     at: Mapped[datetime]
@@ -306,7 +306,7 @@ class AuditEventRow(Row):
 
 
 class WebhookRow(Owned):
-    """Where the ends of an owner's jobs are told. ``secret`` signs, so it is kept as it is."""
+    """An address notified of an owner's events. ``secret`` signs, so it is stored in clear."""
 
     owner: Mapped[str] = mapped_column(sa.String(64), index=True)
     name: Mapped[str | None]
@@ -318,9 +318,9 @@ class WebhookRow(Owned):
 
 
 class WebhookDeliveryRow(Made):
-    """One message to one webhook: ``pending`` until it is ``delivered`` or has ``failed``.
+    """One message to one webhook: ``pending``, then ``delivered`` or ``failed``.
 
-    ``attempts`` is also the fencing token: only who made the newest attempt tells how it went.
+    ``attempts`` is also the fencing token: only the newest attempt may record its result.
     """
 
     __table_args__ = (sa.Index("ix_webhook_delivery_due", "state", "due_at"),)
@@ -338,10 +338,10 @@ class WebhookDeliveryRow(Made):
 
 
 class PlanRow(Owned):
-    """A plan with a life: a job's answer that is approved, published, and one day superseded.
+    """A plan in operations: a job's answer that is approved, published, and later superseded.
 
-    What it says never changes; a change is a new plan with a ``parent_id``. ``version`` grows with
-    each transition. ``violations`` are those that approval has to waive.
+    Its content never changes; a change is a new plan with a ``parent_id``. ``version`` grows with
+    each transition. ``violations`` are those that approval must waive.
     """
 
     __table_args__ = (sa.Index("ix_plan_owner_state_id", "owner", "state", "id"),)
@@ -359,9 +359,9 @@ class PlanRow(Owned):
 
 
 class PlanSatelliteRow(Row):
-    """A satellite of a plan, and the span in which the plan is in force for it.
+    """A satellite of a plan, and the time span in which the plan is in force for it.
 
-    Both ends are null as long as the plan has not been published.
+    Both ends are null until the plan is published.
     """
 
     plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
@@ -374,8 +374,8 @@ class PlanSatelliteRow(Row):
 class PlanActionRow(Row):
     """A collect or a contact of a plan. ``action_id`` is its id in the job's timeline.
 
-    ``delivered_at`` of a collect is when the plan has its image down; null for never, and in plans
-    of earlier releases. There ``station_name`` is null too, where the station is no longer stored.
+    ``delivered_at`` of a collect is when the plan has its image downlinked; null for never, and in
+    plans of earlier releases. In those, ``station_name`` is null if the station was deleted.
     """
 
     plan_id: Mapped[str] = mapped_column(sa.ForeignKey("plan.id"), primary_key=True)
@@ -417,13 +417,13 @@ class PlanStateRow(Reported):
 
 
 class PublisherRow(Row):
-    """One row for each owner, locked by whoever publishes: one plan after the other."""
+    """One row per owner, locked while publishing, so that plans are published one by one."""
 
     owner: Mapped[str] = mapped_column(sa.String(64), primary_key=True)
 
 
 class ExecutionRow(Reported):
-    """What became of an action."""
+    """The reported outcome of an action."""
 
     __tablename__ = "plan_execution"
 

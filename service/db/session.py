@@ -1,4 +1,4 @@
-"""The database: one engine per process, transactions that commit at the edge."""
+"""The database: one engine per process, with transactions committed where they are opened."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ class Database:
     Parameters
     ----------
     url
-        SQLAlchemy URL. A SQLite file (its folder is made) or PostgreSQL.
+        SQLAlchemy URL: a SQLite file (its folder is created) or PostgreSQL.
     timeout_s
-        How long a statement may take on PostgreSQL.
+        Time limit of a statement on PostgreSQL.
     """
 
     def __init__(self, url: str, timeout_s: float = DEFAULT_TIMEOUT_S):
         self.engine = make_engine(url, timeout_s)
         self._reader = self.engine.execution_options(read_only=True)
-        # One query needs no transaction. On PostgreSQL that saves two journeys to the server.
+        # One query needs no transaction. On PostgreSQL that saves two round trips to the server.
         alone: dict[str, Any] = {"isolation_level": "AUTOCOMMIT"}
         if self.engine.dialect.name == "sqlite":
             alone = {_NO_TRANSACTION: True}
         self._asker = self._reader.execution_options(**alone)
         self._untested: sa.Engine = self._asker
         if self.engine.dialect.name == "postgresql":
-            # To test a connection before each use costs as much as a small query.
-            # Nor is one set up for each, or tidied after it: there is no transaction to end.
+            # Testing a connection before each use costs as much as a small query. Nor is one set
+            # up before or reset after each use: there is no transaction to end.
             self._untested = make_postgresql_engine(
                 url, timeout_s, pool_size=1, max_overflow=1, pool_pre_ping=False,
                 pool_reset_on_return=None, **alone,
@@ -55,19 +55,19 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Session]:
-        """Yield a session on one snapshot, for reading only; it never waits for a writer."""
+        """Yield a read-only session on one snapshot; it never waits for a writer."""
         with Session(self._reader, expire_on_commit=False) as session, session.begin():
             yield session
 
     @contextmanager
     def asking(self) -> Iterator[sa.Connection]:
-        """Yield a connection for one query that is quicker than a session is made."""
+        """Yield a connection for one query, which is cheaper than a session."""
         with self._asker.begin() as connection:
             yield connection
 
     @contextmanager
     def asking_untested(self) -> Iterator[sa.Connection]:
-        """Yield the same, without a look whether it still works: for who can ask another way."""
+        """Yield the same without testing that it works: for callers that can ask another way."""
         with self._untested.begin() as connection:
             yield connection
 
@@ -78,16 +78,16 @@ class Database:
 
 
 def take_turns(session: Session, name: str) -> None:
-    """Let other transactions that call this with the same name wait until this one has ended.
+    """Make other transactions that call this with the same name wait until this one has ended.
 
-    For what a constraint cannot say. On SQLite one transaction at a time writes anyway.
+    For rules that no constraint can express. SQLite has only one writer at a time anyway.
     """
     if session.get_bind().dialect.name == "postgresql":
         session.execute(sa.select(sa.func.pg_advisory_xact_lock(sa.func.hashtext(name))))
 
 
 def inserted(session: Session, table: type[Row], **values: Any) -> bool:
-    """Insert a row, unless there is one of its keys, be it from this moment; return whether so."""
+    """Insert a row unless one with its keys exists or is inserted now; return whether it was."""
     dialect = postgresql if session.get_bind().dialect.name == "postgresql" else sqlite
     statement = dialect.insert(table).values(**values).on_conflict_do_nothing()
     own = statement.returning(*sa.inspect(table).primary_key)
@@ -101,14 +101,14 @@ def changed(
     *columns: sa.SQLColumnExpression[Any],
     **values: Any,
 ) -> sa.Row[*tuple[Any, ...]] | None:
-    """Change the row for which a condition holds; return these columns of it, None if none did."""
+    """Change the row that meets a condition; return these columns, or None if there is none."""
     statement = sa.update(table).where(guard).values(**values).returning(*columns)
     statement = statement.execution_options(synchronize_session=False)
     return session.execute(statement).one_or_none()
 
 
 def make_engine(url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S) -> sa.Engine:
-    """Return an engine set up as the service needs it (SQLite: WAL, every commit synced)."""
+    """Return an engine configured for the service (SQLite: WAL, every commit synced)."""
     address = sa.make_url(url)
     if address.get_backend_name() != "sqlite":
         return make_postgresql_engine(url, timeout_s, pool_size=10, max_overflow=40)
@@ -121,7 +121,7 @@ def make_engine(url: str, timeout_s: float | None = DEFAULT_TIMEOUT_S) -> sa.Eng
 
 
 def _prepare_sqlite(connection: Any, _record: object) -> None:
-    # Python's driver would begin transactions by itself, and too late; see _begin_sqlite.
+    # Python's driver would begin transactions itself, and too late; see _begin_sqlite.
     connection.isolation_level = None
     cursor = connection.cursor()
     for pragma in _SQLITE_PRAGMAS:
@@ -132,8 +132,8 @@ def _prepare_sqlite(connection: Any, _record: object) -> None:
 
 
 def _begin_sqlite(connection: sa.Connection) -> None:
-    # A transaction that reads first and writes later cannot wait for another writer: SQLite
-    # refuses it at once. Taking the write lock first makes it queue within busy_timeout.
+    # SQLite at once refuses a transaction that read first and now wants to write while another
+    # writes. Taking the write lock first makes it wait up to busy_timeout instead.
     options = connection.get_execution_options()
     if options.get(_NO_TRANSACTION):
         return

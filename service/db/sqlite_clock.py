@@ -1,7 +1,7 @@
-"""A clock that an older SQLite lacks, for all engines of this process.
+"""A clock that older SQLite versions lack, for all engines of this process.
 
-With Python 3.12 and later DBOS asks SQLite for ``unixepoch('subsec')``, which came with SQLite
-3.42 and is NULL before. Python may well be linked with an older one (Debian 12 has 3.40).
+With Python 3.12 and later, DBOS asks SQLite for ``unixepoch('subsec')``, which came with SQLite
+3.42 and is NULL before. Python may be linked with an older one (Debian 12 has 3.40).
 DBOS makes engines of its own, so the function is added to all.
 """
 
@@ -17,13 +17,13 @@ FIRST_WITH_SUBSEC: Final = (3, 42)
 
 
 def add_sqlite_clock() -> None:
-    """Give every SQLite connection made from now on ``unixepoch('subsec')``, where it has none."""
+    """Give every new SQLite connection ``unixepoch('subsec')`` if SQLite lacks it."""
     if sqlite3.sqlite_version_info < FIRST_WITH_SUBSEC:
         sa.event.listen(sa.Engine, "connect", _add_clock)
 
 
 def unixepoch(argument: object) -> float | int | None:
-    """Return the seconds since 1970 as SQLite's ``unixepoch(argument)``, for now alone."""
+    """Return seconds since 1970 like SQLite's ``unixepoch(argument)``, but only for now."""
     if argument == "subsec":
         return time.time()
     return int(time.time()) if argument == "now" else None

@@ -1,4 +1,4 @@
-"""How long a database may take, for whoever must not import one to know it."""
+"""The database's time limit, for modules that must not import the database."""
 
 from __future__ import annotations
 
