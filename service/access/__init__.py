@@ -1,1 +1,1 @@
-"""Who may call the service, how often, and the record of what they changed."""
+"""Who may call the service and how often, and the record of changes."""

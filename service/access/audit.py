@@ -1,4 +1,4 @@
-"""The record of changes: who did what to what, written in the transaction of the change."""
+"""The record of changes: who changed what, written in the transaction of the change."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from service.db.rows import AuditEventRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Audit:
-    """Writes down the changes of one request."""
+    """Records the changes of one request."""
 
     caller: Caller
     request_id: str | None
@@ -43,4 +43,4 @@ class Audit:
 BY_COMMAND_LINE: Final = Audit(
     caller=Caller(owner="command line", scope=Scope.ADMIN), request_id=None
 )
-"""Whoever has the database itself."""
+"""Whoever has access to the database itself."""

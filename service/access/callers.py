@@ -1,4 +1,4 @@
-"""Who calls, and what a caller may do."""
+"""Callers, and what they may do."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from enum import StrEnum
 from typing import Final
 
 LOCAL_OWNER: Final = "local"
-"""Owner of what is done without a key, which only a server on loopback allows."""
+"""Owner of everything done without a key, which only a server on loopback allows."""
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
 class Scope(StrEnum):
-    """What a key is good for. Each scope includes those before it."""
+    """What a key permits. Each scope includes those before it."""
 
     READ = "read"
     SUBMIT = "submit"
@@ -22,7 +22,7 @@ class Scope(StrEnum):
     ADMIN = "admin"
 
     def includes(self, other: Scope) -> bool:
-        """Return whether this scope allows all that the other one does.
+        """Return whether this scope permits all that the other one does.
 
         >>> Scope.SUBMIT.includes(Scope.READ), Scope.SUBMIT.includes(Scope.ADMIN)
         (True, False)
@@ -33,12 +33,12 @@ class Scope(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """Whoever sent a request.
+    """The sender of a request.
 
     Attributes
     ----------
     owner
-        Whose jobs these are; several keys may share an owner.
+        The owner of its jobs; several keys may share an owner.
     key_id, key_name
         None without a key.
     """
@@ -50,13 +50,13 @@ class Caller:
 
     @property
     def visible_owner(self) -> str | None:
-        """Return the one owner whose jobs this caller sees, or None for all."""
+        """Return the owner whose jobs this caller sees, or None for all owners."""
         return None if self.scope is Scope.ADMIN else self.owner
 
 
 LOCAL_CALLER: Final = Caller(owner=LOCAL_OWNER, scope=Scope.ADMIN)
 NOBODY: Final = Caller(owner="nobody", scope=Scope.READ)
-"""Whoever reads what is open to all: nobody asked for a key."""
+"""The caller of what is open to all, for which no key is required."""
 
 
 def is_plain_name(text: str) -> bool:

@@ -1,4 +1,4 @@
-"""API keys in the database: made, listed, revoked, looked up."""
+"""API keys in the database: create, list, revoke, look up."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _OF_A_CALLER: Final = (
 def create(
     session: Session, *, name: str, owner: str, scope: Scope, expires_days: float
 ) -> tuple[str, str]:
-    """Store a new key. Return its id and its token, which nobody can find out again."""
+    """Store a new key. Return its id and its token, which cannot be recovered later."""
     key_id, token = new_token()
     session.execute(
         sa.insert(ApiKeyRow).values(
@@ -42,7 +42,7 @@ def create(
 
 
 def every_key(session: Session) -> Sequence[tuple[ApiKeyRow, bool]]:
-    """Return all keys, oldest first, each with whether it is good now."""
+    """Return all keys, oldest first, each with whether it is valid now."""
     rows = session.execute(
         sa.select(ApiKeyRow, _is_good()).order_by(ApiKeyRow.created_at, ApiKeyRow.id)
     )
@@ -50,13 +50,13 @@ def every_key(session: Session) -> Sequence[tuple[ApiKeyRow, bool]]:
 
 
 def revoke(session: Session, key_id: str) -> bool:
-    """Make a key worthless from now on; return whether it was there and not yet revoked."""
+    """Invalidate a key from now on; return whether it existed and was not yet revoked."""
     is_good = sa.and_(ApiKeyRow.id == key_id, ApiKeyRow.revoked_at.is_(None))
     return changed(session, ApiKeyRow, is_good, ApiKeyRow.id, revoked_at=utc_now()) is not None
 
 
 def has_key(session: Session, key_id: str) -> bool:
-    """Return whether there is a key of this id, good or not."""
+    """Return whether there is a key with this id, valid or not."""
     return session.scalar(sa.select(ApiKeyRow.id).where(ApiKeyRow.id == key_id)) is not None
 
 
@@ -67,12 +67,12 @@ def ended_of(connection: sa.Connection, key_ids: Collection[str]) -> set[str]:
 
 
 def has_good_key(session: Session) -> bool:
-    """Return whether anybody holds a key that is good now."""
+    """Return whether any key is valid now."""
     return session.scalar(sa.select(ApiKeyRow.id).where(_is_good()).limit(1)) is not None
 
 
 def callers_of(connection: sa.Connection, tokens: Collection[str]) -> dict[str, Caller]:
-    """Return whose tokens these are, without those that are wrong, expired or revoked."""
+    """Return the callers of these tokens, without wrong, expired or revoked ones."""
     key_ids = {token: key_id for token in tokens if (key_id := key_id_of(token)) is not None}
     if not key_ids:
         return {}

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_CALLERS: Final = 50_000
-"""Beyond this the bucket that was used the longest ago is forgotten, and is full again."""
+"""Beyond this number, the least recently used bucket is forgotten, and full again later."""
 
 
 class RateLimiter:
-    """Lets each caller make ``per_s`` requests a second, and ``burst`` at once.
+    """Lets each caller make ``per_s`` requests a second, and up to ``burst`` at once.
 
-    For one thread, which is the server's event loop.
+    For use in one thread, the server's event loop.
     """
 
     def __init__(self, per_s: float, burst: int, clock: Callable[[], float] = time.monotonic):
@@ -28,10 +28,10 @@ class RateLimiter:
 
         Returns
         -------
-        Seconds until the caller may ask again, 0 where the request may pass.
+        Seconds until the caller may try again; 0 if the request may pass.
         """
         now_s = self._clock()
-        # Put back at the end: the first one is that which was used the longest ago.
+        # Put back at the end, so that the least recently used one comes first.
         tokens, filled_s = self._buckets.pop(caller, (self._burst, now_s))
         tokens = min(self._burst, tokens + (now_s - filled_s) * self._per_s)
         wait_s = max(0.0, (1.0 - tokens) / self._per_s)

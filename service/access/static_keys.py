@@ -15,18 +15,18 @@ _TOKEN = re.compile(r"[A-Za-z0-9._~+/=-]+")
 
 @dataclass(frozen=True, slots=True)
 class StaticKeys:
-    """The keys of the setting; only digests of their tokens are kept."""
+    """The keys in the setting; only digests of their tokens are kept."""
 
     by_digest: dict[str, Caller]
 
     @classmethod
     def parse(cls, text: str) -> StaticKeys:
-        """Return the keys of ``name:scope:token,...``; the name is the owner as well.
+        """Return the keys of ``name:scope:token,...``; each name is also the owner.
 
         Raises
         ------
         ValueError
-            With the number of the wrong entry, and never its token.
+            With the number of the wrong entry, but never its token.
         """
         entries = [entry.strip() for entry in text.split(",") if entry.strip()]
         found = [_parse(entry, number) for number, entry in enumerate(entries, start=1)]
@@ -35,8 +35,8 @@ class StaticKeys:
         return cls(dict(found))
 
     def find(self, token: str) -> Caller | None:
-        """Return whose token this is."""
-        # Looked up by its digest, whose timing tells nothing about the token.
+        """Return the caller with this token."""
+        # The time of a lookup by digest reveals nothing about the token.
         return self.by_digest.get(digest_of(token))
 
     def __bool__(self) -> bool:

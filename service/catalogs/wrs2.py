@@ -27,7 +27,7 @@ EQUATOR_ROW = 60
 PATH_1_NODE_LON_DEG = -64.6
 INCLINATION_DEG = 98.2
 DAYTIME_ROWS = (*range(1, 142), 246, 247, 248)
-"""Rows that Landsat images by day: the descending half, and past both ends in polar summer."""
+"""Rows that Landsat images by day: the descending half, and beyond both ends in polar summer."""
 
 CATALOG_FILE = "wrs2_land.csv"
 _WGS84_FLATTENING = 1.0 / 298.257223563
@@ -43,7 +43,7 @@ class Scene:
 
 
 def scene_id(path: int, row: int) -> str:
-    """Return the catalogue's name of a scene.
+    """Return the catalogue's id of a scene.
 
     >>> scene_id(16, 48)
     'WRS2-016048'
@@ -95,7 +95,7 @@ def grid(rows: tuple[int, ...]) -> tuple[Ints, Ints]:
 
 
 def wrs2_land_csv() -> str:
-    """Return the shipped catalogue as it is posted to the API: ``id,lat_deg,lon_deg``."""
+    """Return the shipped catalogue in the form that the API takes: ``id,lat_deg,lon_deg``."""
     return resources.files(__package__).joinpath(CATALOG_FILE).read_text(encoding="utf-8")
 
 

@@ -1,1 +1,1 @@
-"""What the program ``slewline`` does: one module for each command, and what they share."""
+"""The commands of the program ``slewline``: one module for each, and what they share."""

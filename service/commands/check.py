@@ -1,4 +1,4 @@
-"""``slewline check``: a timeline of any origin, judged by the referee against its scenario."""
+"""``slewline check``: a timeline from any source, judged by the referee against its scenario."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _MOST_FAULTS = 20
 
 
 def check(options: argparse.Namespace) -> int:
-    """Judge the plan in a file, print the verdict, and return 0 where it is valid, else 1.
+    """Judge the plan in a file, print the verdict, and return 0 if it is valid, else 1.
 
-    It is a timeline as ``.json`` or ``.csv``: this service's own, an edited or a foreign one.
+    The file is a timeline as ``.json`` or ``.csv``, from this service, edited, or foreign.
     """
     try:
         with told_of(options.scenario):
@@ -86,7 +86,7 @@ def _row(problem: Problem, reading: Reading, verdict: Timeline, validity: str) -
 
 
 def _complaints(scenario: Scenario, reading: Reading, verdict: Timeline) -> Iterator[str]:
-    """Yield a line for each thing that is wrong with the plan, and where in the file it stands."""
+    """Yield a line for each fault of the plan, with its location in the file."""
     for place, detail in reading.impossible:
         yield f"{place}: window: {detail}"
     for violation in verdict.violations:
@@ -100,7 +100,7 @@ def _complaints(scenario: Scenario, reading: Reading, verdict: Timeline) -> Iter
 def _differences(
     claimed: Mapping[str, Any], scenario_sha256: str, own_hash: str, reward: float
 ) -> Iterator[str]:
-    """Yield what a timeline document says of itself that is not so."""
+    """Yield the statements of a timeline document about itself that are false."""
     said = claimed.get("scenario_sha256", scenario_sha256)
     if said != scenario_sha256:
         yield f"note: the file was made for another scenario, {said}"

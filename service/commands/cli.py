@@ -20,11 +20,11 @@ _LONGEST_DAYS = 3650
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit status: 0 well, 1 failed, 2 wrong input."""
+    """Run one command and return its exit status: 0 success, 1 failure, 2 wrong input."""
     options = _parser().parse_args(arguments)
     module, _, function = options.command.partition(":")
     try:
-        # Only now: some take long to import what they need.
+        # Imported only now: some commands need slow imports.
         with importing():
             command = import_module(f"service.commands.{module}")
         status: int = getattr(command, function)(options)
@@ -43,13 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(message: str, status: int) -> int:
-    """Say what went wrong; return the status."""
+    """Print what went wrong; return the status."""
     print(f"slewline: {message}", file=sys.stderr)
     return status
 
 
 def _why_database_failed(error: BaseException) -> str | None:
-    """Return why the database could not serve, or None where something else went wrong."""
+    """Return why the database could not serve, or None if something else went wrong."""
     if "sqlalchemy" not in sys.modules:
         return None
     from service.db.failures import why_unavailable
@@ -125,7 +125,7 @@ def _command(
     run: str,
     help: str,  # noqa: A002 - as argparse names it
 ) -> argparse.ArgumentParser:
-    """Add a command; it is run by the function ``module:function`` of this package."""
+    """Add a command, run by the function ``module:function`` of this package."""
     parser: argparse.ArgumentParser = commands.add_parser(name, help=help, description=help)
     parser.set_defaults(command=run)
     return parser
@@ -241,7 +241,7 @@ def _timeline_file(text: str) -> Path:
 
 
 def _parameter(text: str) -> tuple[str, Any]:
-    """Return name and value of ``KEY=VALUE``.
+    """Return the name and value in ``KEY=VALUE``.
 
     >>> _parameter("depth=3"), _parameter("feasibility=penalty")
     (('depth', 3), ('feasibility', 'penalty'))

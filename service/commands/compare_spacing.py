@@ -1,4 +1,4 @@
-"""``slewline compare-spacing``: what more starts in each access gain on one's own mission."""
+"""``slewline compare-spacing``: what more starts per access gain on the user's own mission."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from service.commands.summary import cell
 from service.scenarios.translate import quality_from, read_file
 
 SPACINGS_S: Final = (60.0, 30.0, 15.0)
-"""Those that are tried unless others are named."""
+"""Spacings tried by default."""
 
 _HEADER: Final = (
     "starts", "opportunities", "reward", "gain", "bound", "gap", "search_s", "ended", "validity",
@@ -28,7 +28,7 @@ _WIDTHS: Final = (12, 13, 9, 7, 9, 7, 8, 16, 10)
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """What a search has found for one choice of starts."""
+    """The result of a search for one choice of starts."""
 
     starts: str
     num_opportunities: int
@@ -51,7 +51,7 @@ class _Row:
         return replace(self, timeline={**self.timeline, **plan, **told})
 
     def cells(self, first: float) -> tuple[str, ...]:
-        """Return what is printed, with the gain on the first row."""
+        """Return the cells to print, with the gain over the first row."""
         totals = self.timeline["totals"]
         gain = self.reward / first - 1.0 if first else 0.0
         return (
@@ -68,10 +68,10 @@ class _Row:
 
 
 class _Search(Search):
-    """How each row is searched for."""
+    """The search for each row."""
 
     def row(self, starts: str, question: Mapping[str, Any]) -> _Row:
-        """Plan a question."""
+        """Plan a scenario."""
         budget = Budget(self.time_s)
         answer = answer_of(self.request(question), budget)
         assert answer.opportunity_block is not None
@@ -84,11 +84,11 @@ class _Search(Search):
         )
 
     def row_from(self, above: _Row, row: _Row, question: Mapping[str, Any]) -> _Row:
-        """Return the best of a row, of another search from the plan above, and of that plan.
+        """Return the best of a row, another search from the plan above, and that plan itself.
 
-        The time was too short: with more freedom the plan above can be flown as well.
+        The search was too short, since a row with more freedom can also fly the plan above.
         """
-        if not question["continuous_starts"]:  # no search starts from a plan there
+        if not question["continuous_starts"]:  # otherwise no search can start from a plan
             replan = {"replan": _from_plan(above, question)}
             again = self.row(row.starts, {**question, **replan})
             row = max(row, again, key=lambda one: one.reward)
@@ -96,12 +96,12 @@ class _Search(Search):
 
 
 def compare_spacing(options: argparse.Namespace) -> int:
-    """Plan a scenario file with ever more starts, print a line for each; return 0 if all are valid.
+    """Plan a scenario file with ever more starts and print each row; return 0 if all are valid.
 
-    What the file says of spacing and continuous starts is varied. With ``quality`` its collects do
-    not start anywhere. No row is worse than the one above it: where a search ends before it gets so
-    far, another one starts from the plan above; that plan itself may be flown in any case. Ctrl-C
-    ends the search that runs, and the comparison.
+    The file's own spacing and continuous starts are replaced. With ``quality``, collects cannot
+    start anywhere. No row is worse than the one above it: if its search is, another one starts from
+    the plan above, and that plan itself counts in any case. Ctrl-C ends the running search and the
+    comparison.
     """
     with told_of(options.scenario):
         require_folder(options.out)

@@ -1,4 +1,4 @@
-"""``slewline demo``: the real service, a real-size mission through its HTTP API, every solver."""
+"""``slewline demo``: the real service plans a real-size mission with each solver over HTTP."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from service.wire.instants import instant_text
 
 SEARCH_TIME_S: Final = 10.0
 _READY: Final = "Slewline is ready at "
-_LAST_LINES: Final = 20  # of the log, where the service did not start
+_LAST_LINES: Final = 20  # of the log, if the service did not start
 
 
 def demo(options: argparse.Namespace) -> int:
-    """Start the service, plan the mission with each solver, print and write what came out.
+    """Start the service, plan the mission with each solver, print and write the results.
 
-    Returns 0 where every plan is valid, else 1. With ``--serve`` it goes on serving until SIGINT or
-    SIGTERM, at the port of the settings; else a free one is taken.
+    Returns 0 if every plan is valid, else 1. With ``--serve`` it goes on serving until SIGINT or
+    SIGTERM, on the port of the settings; otherwise it uses a free port.
     """
     settings, folder = settings_of(options), options.out
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -57,7 +57,7 @@ def demo(options: argparse.Namespace) -> int:
 
 
 def _compile() -> None:
-    """Compile the kernels that the demonstration needs; import them for that alone."""
+    """Compile the kernels that the demonstration needs, importing them only if necessary."""
     if compiled.is_ready("all") or compiled.is_ready("demonstration"):
         return
     from service.jobs import warm
@@ -76,7 +76,7 @@ def _plan_mission(client: Client, folder: Path) -> int:
         flush=True,
     )
     solvers = [solver.name for solver in client.solvers()]
-    # The last take longest, so they begin first: two workers end at about the same time.
+    # The last solvers take longest, so they are queued first: two workers end about together.
     jobs = {
         solver: client.jobs.submit(scenario, solver, time_s=SEARCH_TIME_S)
         for solver in reversed(solvers)
@@ -129,7 +129,7 @@ def _service(port: int, workers: int, log: Path) -> Iterator[str]:
             stderr=log_file,
             text=True,
             env=os.environ | {"SLEWLINE_REQUIRE_KEYS": "false"},
-            start_new_session=True,  # so that Ctrl-C reaches this process alone, which ends it
+            start_new_session=True,  # so that Ctrl-C reaches only this process, which ends it
         )
         try:
             yield _url_when_ready(process, log)

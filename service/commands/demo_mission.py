@@ -2,7 +2,7 @@
 
 Orbit, stations, targets and day are those of arXiv:1910.08419 (section Experiments): a circular
 polar orbit at 500 km, two polar ground stations, 1,000 targets drawn from the Landsat scenes on
-land. The spacecraft is not the paper's but a generic optical one, whose plans can be flown.
+land. The spacecraft is a generic optical one instead of the paper's, so that plans can be flown.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ HORIZON: Final = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-02T00:00:00Z"
 
 
 def targets_csv(num_targets: int = NUM_TARGETS, seed: int = SEED) -> str:
-    """Return a target catalogue drawn from the shipped scenes, the same for the same seed."""
+    """Return a target catalogue drawn from the shipped scenes, determined by the seed."""
     drawn = random.Random(seed).sample(load_wrs2_land(), num_targets)
     lines = [f"{scene.id},{scene.lat_deg:.6f},{scene.lon_deg:.6f}" for scene in drawn]
     return "\n".join(["id,lat_deg,lon_deg", *lines, ""])

@@ -1,4 +1,4 @@
-"""``slewline keys``: make, list and revoke API keys in the database."""
+"""``slewline keys``: create, list and revoke API keys in the database."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HEADER = ("id", "name", "owner", "scope", "made", "expires", "state")
 
 
 def create_key(options: argparse.Namespace) -> int:
-    """Store a key and print its token, this once: the token alone on standard output."""
+    """Store a key and print its token for the only time, alone on standard output."""
     with _database(options) as database, database.transaction() as session:
         key_id, token = key_store.create(
             session, name=options.name, owner=options.owner, scope=Scope(options.scope),
@@ -37,7 +37,7 @@ def create_key(options: argparse.Namespace) -> int:
 
 
 def list_keys(options: argparse.Namespace) -> int:
-    """Print a table of all keys, those that are no longer good included."""
+    """Print a table of all keys, including those no longer valid."""
     with _database(options) as database, database.reading() as session:
         keys = key_store.every_key(session)
     rows = [
@@ -50,7 +50,7 @@ def list_keys(options: argparse.Namespace) -> int:
 
 
 def revoke_key(options: argparse.Namespace) -> int:
-    """Make a key worthless at once."""
+    """Invalidate a key at once."""
     key_id = options.key_id
     with _database(options) as database, database.transaction() as session:
         is_new = key_store.revoke(session, key_id)
@@ -64,7 +64,7 @@ def revoke_key(options: argparse.Namespace) -> int:
 
 
 def _database(options: argparse.Namespace) -> closing[Database]:
-    """Return the database, which has its tables by then and is closed by who uses it."""
+    """Return the database with its tables created; the caller closes it."""
     url = settings_of(options).database_url
     upgrade(url)
     return closing(Database(url))

@@ -1,4 +1,4 @@
-"""How a command ends: its exit status, and what is said where it is not 0."""
+"""How a command ends: its exit status, and the errors behind a status other than 0."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ WRONG_INPUT: Final = 2
 
 
 class WrongInput(Exception):
-    """Something on the command line, in the environment or in a file; the message names it."""
+    """An error on the command line, in the environment or in a file; the message names it."""
 
 
 class Failed(Exception):
-    """The command cannot do what it is for; the message says why."""
+    """The command cannot do its work; the message says why."""

@@ -1,4 +1,4 @@
-"""``slewline plan`` and ``replan``: a question to a service, its plan back."""
+"""``slewline plan`` and ``replan``: submit a job to a service and get its plan."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from service.commands.replan import print_draft
 from service.commands.scenario_files import place_of, read_object, require_folder, told_of
 from service.commands.summary import summary
 
-_SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service has the last word
+_SUFFIXES: Final = (".json", ".csv", ".geojson", ".czml", ".ics")  # the service decides
 _OPTIONS: Final = {
     "/limits/time_s": "--time-s",
     "/seed": "--seed",
@@ -31,7 +31,7 @@ _OPTIONS: Final = {
     "/name": "--name",
 }
 _OF_THE_INPUT: Final = (413, 422)
-_STORED: Final = "the plan"  # where no file is given
+_STORED: Final = "the plan"  # if no file is given
 
 
 def plan(options: argparse.Namespace) -> int:
@@ -59,7 +59,7 @@ def plan(options: argparse.Namespace) -> int:
 def replan(options: argparse.Namespace) -> int:
     """Have a service replan a plan after what happened, and follow it.
 
-    Where the job is cancelled, the best plan that it had by then is a draft all the same.
+    If the job is cancelled, its best plan so far still becomes a draft.
     """
     with _placed(options.happened or _STORED):
         _check_out(options)
@@ -110,7 +110,7 @@ def _placed(file: Path | str) -> Iterator[None]:
 
 
 def _faults(error: ServiceError, file: Path | str) -> str:
-    """Return what the service found wrong, a line for each fault."""
+    """Return the faults that the service found, one per line."""
     lines = []
     for fault in error.errors:
         pointer = fault.pointer or ""
@@ -126,21 +126,21 @@ def _follow_to_plan(
     options: argparse.Namespace,
     tell: Callable[[Job], None] = lambda _: None,
 ) -> int:
-    """Submit a job, follow it, print a summary of its plan; return 0 where that is valid, else 1.
+    """Submit a job, follow it, print a summary of its plan; return 0 if that is valid, else 1.
 
-    Ctrl-C cancels the job and saves the best plan that it had; a second one leaves at once.
+    Ctrl-C cancels the job and saves its best plan so far; a second Ctrl-C leaves at once.
 
     Parameters
     ----------
     submit
-        Posts the job under a key of its own: asked twice, it is the same job.
+        Posts the job under a fixed idempotency key: called twice, it returns the same job.
     tell
-        Prints what else there is to say of a job that has a plan.
+        Prints further information about a job that has a plan.
     """
     try:
         job = submit()
     except KeyboardInterrupt:
-        # It may have been taken already: under the same key that very job is answered.
+        # The service may already have it: under the same key it returns that very job.
         _cancel(submit())
         raise
     if options.detach:
@@ -159,7 +159,7 @@ def _follow_to_plan(
 
 
 def _followed(job: Job) -> Job:
-    """Return the job at its end."""
+    """Return the job when it has ended."""
     with ProgressLine(sys.stderr) as line:
         try:
             return _watched(job, line)
@@ -175,6 +175,6 @@ def _watched(job: Job, line: ProgressLine) -> Job:
 
 
 def _cancel(job: Job) -> Job:
-    with suppress(ServiceError):  # it may have ended by itself: what follows will tell
+    with suppress(ServiceError):  # it may have ended by itself, which the next state shows
         return job.cancel()
     return job

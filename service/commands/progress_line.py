@@ -1,4 +1,4 @@
-"""One line that tells how a job goes; where nobody watches, a line now and then."""
+"""One line of progress of a job; a line now and then if the output is not a terminal."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _QUIET_S: Final = 30.0
 class ProgressLine:
     """Shows state, phase, reward, bound and the seconds since it was opened.
 
-    On a terminal the line is drawn again all the time, for the seconds go on while the job
-    tells nothing new. Elsewhere a line is written where the phase changes, or half a minute
-    has passed since the last one.
+    On a terminal the line is redrawn continually, since the seconds go on without news of the
+    job. Elsewhere, a line is written when the phase changes, or half a minute after the
+    last one.
     """
 
     def __init__(self, stream: TextIO):
@@ -44,7 +44,7 @@ class ProgressLine:
             self._stream.write("\n")
 
     def show(self, job: Job) -> None:
-        """Tell how the job is."""
+        """Show the job's state."""
         self._job = job
         if self._is_live:
             self._draw(job)
@@ -72,7 +72,7 @@ class ProgressLine:
 
 
 def progress_text(job: Job) -> str:
-    """Return how a job is, in one line without the time."""
+    """Return the state of a job in one line, without the time."""
     progress = job.progress
     if job.state not in ("running", "cancelling") or progress is None:
         return f"{job.state:<10}"

@@ -1,4 +1,4 @@
-"""What ``slewline replan`` prints: the draft that it has made, and what is different in it."""
+"""What ``slewline replan`` prints: the draft that it made, and the changes in it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _HEADER = ("change", "cause", "satellite", "action", "of", "was at", "is at")
 
 
 def print_draft(client: Client, plan_id: str, job: Job) -> None:
-    """Print which draft a job has left of a plan, and a line for each action that it changes."""
+    """Print the draft that a job has made from a plan, and a line for each changed action."""
     draft = client.plans.draft_of(job)
     print(f"\ndraft {draft.id}, after {plan_id}")
     changes = client.plans.changes(draft.id)

@@ -15,7 +15,7 @@ from service.commands.outcome import Failed, WrongInput
 
 @contextmanager
 def told_of(scenario: Path | str) -> Iterator[None]:
-    """Tell what is wrong with a scenario file, or with the search that it is given to."""
+    """Report errors in a scenario file, or in the options of its search."""
     try:
         yield
     except PlannerError as error:
@@ -28,7 +28,7 @@ def told_of(scenario: Path | str) -> Iterator[None]:
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """Return what a file holds, a scenario say, not yet checked beyond being a JSON object."""
+    """Return the JSON object in a file, for example a scenario, without further checks."""
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
@@ -39,13 +39,13 @@ def read_object(path: Path) -> dict[str, Any]:
 
 
 def require_folder(out: Path | None) -> None:
-    """Refuse a file whose folder is not there: better said before the search than after it."""
+    """Refuse a file whose folder does not exist, before the search rather than after it."""
     if out is not None and not out.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "No such folder", str(out.parent))
 
 
 def place_of(pointer: str, scenario: Path | str) -> str:
-    """Return where on the command line or in the file a fault lies.
+    """Return where on the command line or in the file a fault is.
 
     >>> place_of("/params/depth", Path("day.json")), place_of("/horizon/end", Path("day.json"))
     ('--param depth', 'day.json /horizon/end')

@@ -1,6 +1,6 @@
-"""Commands that run the service or a part of it, and what they share: the settings.
+"""Commands that run the service or a part of it, and the settings that they share.
 
-Whatever takes long to import is imported by the command that needs it.
+Modules that are slow to import are imported by the command that needs them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
-    """Return the settings of the environment, with the options given on top."""
+    """Return the settings of the environment, overridden by the options given."""
     from pydantic import SecretStr, ValidationError
 
     from service.settings import Settings
@@ -29,14 +29,14 @@ def settings_of(options: argparse.Namespace) -> Settings:
         first = error.errors()[0]
         name = str(first["loc"][0])
         option = f"--{name.replace('_', '-')}" if name in given else f"SLEWLINE_{name.upper()}"
-        # A setting with secrets in it is never repeated.
+        # A setting that holds secrets is never repeated.
         is_secret = Settings.model_fields[name].annotation is SecretStr
         instead = "" if is_secret else f", not {first['input']!r}"
         raise WrongInput(f"{option}: {first['msg']}{instead}") from error
 
 
 def serve(options: argparse.Namespace) -> int:
-    """Run the API, ``with_workers`` or alone."""
+    """Run the API, ``with_workers`` or on its own."""
     with importing():
         from service import server
         from service.process.tracing import CannotTrace
@@ -86,7 +86,7 @@ def openapi(options: argparse.Namespace) -> int:
     """Print the description of the HTTP API."""
     from service.main import create_app
 
-    # The application opens its database at the first request: this one never.
+    # The application opens its database only at the first request, which never comes here.
     settings = settings_of(options).model_copy(update={"database_url": "sqlite:///unused.db"})
     app = create_app(settings)
     print(json.dumps(app.openapi(), indent=2))

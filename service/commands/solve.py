@@ -1,4 +1,4 @@
-"""``slewline solve``: plan a scenario file with the core alone, no service and no database."""
+"""``slewline solve``: plan a scenario file with only the core, without service or database."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from service.scenarios.canonical import canonical, sha256_of
 
 
 def solve(options: argparse.Namespace) -> int:
-    """Plan a scenario file, print a summary, and return 0 where the plan is valid, else 1.
+    """Plan a scenario file, print a summary, and return 0 if the plan is valid, else 1.
 
-    At the end of its time, or by Ctrl-C, the search ends with its best plan so far.
+    When its time is over, or on Ctrl-C, the search ends with its best plan so far.
     """
     with told_of(options.scenario):
         require_folder(options.out)
@@ -38,7 +38,7 @@ def solve(options: argparse.Namespace) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """How a scenario is searched; ``params`` are all that the solver has."""
+    """How a scenario is searched; ``params`` holds all parameters of the solver."""
 
     solver: str
     params: Mapping[str, Any]
@@ -47,12 +47,12 @@ class Search:
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> Self:
-        """Return the search of a command line, the solver's defaults filled in."""
+        """Return the search given on a command line, with the solver's defaults filled in."""
         params = params_of(parse_params(solver_class(options.solver), dict(options.param)))
         return cls(solver=options.solver, params=params, seed=options.seed, time_s=options.time_s)
 
     def request(self, scenario: Mapping[str, Any]) -> PlanRequest:
-        """Return the question of a scenario file."""
+        """Return the request to plan a scenario file."""
         content = canonical(scenario)
         return PlanRequest(
             job_id="local",
@@ -67,7 +67,7 @@ class Search:
 
 def answer_of(request: PlanRequest, budget: Budget) -> PlanAnswer:
     """Return the answer to a request; Ctrl-C and the budget end the search with its best plan."""
-    # In a thread: inside a kernel the main one could not take a signal.
+    # In a thread of its own, since inside a kernel the main thread cannot handle a signal.
     signal.signal(signal.SIGINT, lambda *_: budget.cancel())
     with ThreadPoolExecutor(max_workers=1) as pool:
         return pool.submit(run_plan_job, request, budget).result()

@@ -42,7 +42,7 @@ def summary(timeline: Mapping[str, Any]) -> str:
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Return rows as lines with aligned columns, the first one under the left edge.
+    """Return rows as lines with aligned columns, the first column left-aligned.
 
     >>> print(table([("solver", "reward"), ("rule", "7")]))
     solver  reward
@@ -55,5 +55,5 @@ def table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def cell(value: float | None, layout: str) -> str:
-    """Return a number for a table, a dash where there is none."""
+    """Return a number for a table, or a dash for None."""
     return "-" if value is None else format(value, layout)

@@ -1,1 +1,1 @@
-"""The pages that people see: static HTML, and scripts that call the public API."""
+"""The web pages: static HTML, and scripts that call the public API."""

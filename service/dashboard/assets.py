@@ -1,4 +1,4 @@
-"""The dashboard's files as they are served: read once, named by what they hold."""
+"""The dashboard's files as served: read once, with a hash of their content in the address."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Assets:
     Attributes
     ----------
     version
-        Hash of the static files. It is part of their address, so that a page never runs the
-        scripts of another version and a browser may keep them for ever.
+        Hash of the static files. It is part of their address, so that a page never runs
+        scripts of another version and browsers may cache them for ever.
     static, pages
         By name.
     """
@@ -55,7 +55,7 @@ PAGES: Final = {
     "targets": ("/targets", "Targets"),
     "wall": ("/wall", "Wall"),
 }
-"""Address and title of each page, which has a script of its name."""
+"""Address and title of each page; its script has the page's name."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Where the dashboard's pages and files are. They hold no data and so need no key."""
+"""Routes of the dashboard's pages and files, which hold no data and so need no key."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ PAGE_POLICY: Final = (
     "connect-src 'self'; require-trusted-types-for 'script'; trusted-types 'none'; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
-"""Own files only, nothing inline, and no text that becomes markup."""
+"""Own files only, nothing inline, and no text turned into markup."""
 
 _FOR_EVER: Final = "public, max-age=31536000, immutable"
 
 
 @router.get("/static/{version}/{name}")
 def static_file(version: str, name: str) -> Response:
-    """Return a script, style or picture of this version."""
+    """Return a script, style sheet or picture of this version."""
     assets = load_assets()
     asset = assets.static.get(name) if version == assets.version else None
     if asset is None:
@@ -35,7 +35,7 @@ def static_file(version: str, name: str) -> Response:
 
 
 def _show(name: str, path: str) -> None:
-    """Serve a page under an address; whether there is what it is about, the API will say."""
+    """Serve a page at an address; whether its subject exists is left to the API."""
 
     def page(request: Request) -> Response:
         found = load_assets().pages[name]

@@ -1,1 +1,1 @@
-"""The forms that a timeline is offered in: one module for each, from documents to text."""
+"""The formats in which a timeline is available: one module each, from documents to text."""

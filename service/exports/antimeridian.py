@@ -1,4 +1,4 @@
-"""Lines and areas cut at the antimeridian, as RFC 7946 asks (section 3.1.9)."""
+"""Lines and areas cut at the antimeridian, as required by RFC 7946 (section 3.1.9)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _OVER_THE_POLE_DEG = 90.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A part of a line that lies between -180 and 180 degrees. Shape ``(n,)`` each."""
+    """A part of a line that lies between -180 and 180 degrees. Arrays of shape ``(n,)``."""
 
     lon_deg: Floats
     lat_deg: Floats
@@ -26,17 +26,17 @@ class Piece:
 
 
 def pieces_of_line(lon_deg: Floats, lat_deg: Floats, t_s: Floats) -> Iterator[Piece]:
-    """Yield a line in pieces that end where it leaves the map, and begin where it comes back.
+    """Yield a line in pieces that end where it leaves the map, and begin where it re-enters.
 
-    A step of more than a quarter of a turn passes a pole, where all longitudes meet: there the
-    line leaves the map at the top or at the bottom.
+    A step of more than a quarter turn passes a pole, where all longitudes meet: the line leaves
+    the map at its top or bottom.
 
     Parameters
     ----------
     lon_deg
-        From -180 to 180. Shape ``(n,)``, as the others; ``n`` is 2 or more.
+        From -180 to 180. Shape ``(n,)`` like the others; ``n`` is 2 or more.
     t_s
-        When the line is at each point.
+        Time at each point.
     """
     step_deg = (np.diff(lon_deg) + 180.0) % 360.0 - 180.0
     is_polar = np.abs(step_deg) > _OVER_THE_POLE_DEG
@@ -49,7 +49,7 @@ def pieces_of_line(lon_deg: Floats, lat_deg: Floats, t_s: Floats) -> Iterator[Pi
             ends = np.array([[[lon_deg[row], *at]], [[lon_deg[row + 1], *at]]])
         else:
             edge_deg = np.copysign(180.0, lon_deg[row])
-            # A step from 180 to -180 goes nowhere.
+            # A step from 180 to -180 has length zero.
             share = (edge_deg - lon_deg[row]) / (step_deg[row] or 1.0)
             at = points[row, 1:] + share * (points[row + 1, 1:] - points[row, 1:])
             ends = np.array([[[edge_deg, *at]], [[-edge_deg, *at]]])
@@ -59,7 +59,7 @@ def pieces_of_line(lon_deg: Floats, lat_deg: Floats, t_s: Floats) -> Iterator[Pi
 
 
 def area(lon_deg: Floats, lat_deg: Floats, decimals: int) -> dict[str, Any]:
-    """Return the GeoJSON geometry inside a ring; one round a pole holds the pole.
+    """Return the GeoJSON geometry inside a ring; a ring around a pole contains the pole.
 
     Parameters
     ----------

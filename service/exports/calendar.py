@@ -1,9 +1,9 @@
 """iCalendar (RFC 5545): the contacts, each with an alarm ten minutes before.
 
 A contact keeps its UID from plan to plan, so that a calendar moves an entry instead of adding
-one: the UID is made of satellite, station and the half hour of UTC that the pass's middle lies
-in. A satellite in low orbit comes back to a station after an hour and more, and newer elements
-move a pass by seconds. SEQUENCE and DTSTAMP tell when the plan was made: the newer one counts.
+one: the UID is made of satellite, station and the half hour of UTC that contains the middle of
+the pass. A satellite in low orbit returns to a station after more than an hour, and newer
+elements move a pass by seconds. SEQUENCE and DTSTAMP say when the plan was made: the newer counts.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ def write(answered: Answered) -> Iterator[str]:
 
 
 def around(name: str) -> tuple[str, str]:
-    """Return what stands before the events of a calendar of this name, and behind them."""
+    """Return the text before and after the events of a calendar with this name."""
     calendar = Calendar()
     calendar.add("prodid", f"-//Slewline//{planner_core.__version__}//EN")
     calendar.add("version", "2.0")
     calendar.add("method", "PUBLISH")
     calendar.add("name", name)
-    calendar.add("x-wr-calname", name)  # what calendars show that do not know NAME
+    calendar.add("x-wr-calname", name)  # for calendars that do not know NAME
     head, end, rest = calendar.to_ical().decode().partition("END:VCALENDAR")
     return head, end + rest
 
@@ -73,11 +73,11 @@ def _event(
 
 
 def entry(start: datetime, end: datetime, station: GroundStation, made_at: datetime) -> Event:
-    """Return an event at a station, of a plan that was made at an instant."""
+    """Return an event at a station, for a plan made at an instant."""
     event = Event()
     event.add("sequence", (made_at - _EPOCH) // _SECOND)
     event.add("dtstamp", made_at.replace(microsecond=0))
-    # Calendars know whole seconds: the entry covers the span.
+    # Calendars have whole seconds: the entry covers the whole contact or pass.
     event.add("dtstart", start.replace(microsecond=0))
     event.add("dtend", end.replace(microsecond=0) + _SECOND * (end.microsecond > 0))
     event.add("location", station.name)
@@ -87,7 +87,7 @@ def entry(start: datetime, end: datetime, station: GroundStation, made_at: datet
 
 
 def alarm(what: str) -> Alarm:
-    """Return what tells of an event before it begins."""
+    """Return the alarm before an event."""
     found = Alarm()
     found.add("action", "DISPLAY")
     found.add("trigger", -ALARM)
@@ -96,8 +96,8 @@ def alarm(what: str) -> Alarm:
 
 
 def uid(kind: str, satellite_id: str, station_id: str, middle: datetime, seen: Counter[str]) -> str:
-    """Return what a calendar knows an entry by, from plan to plan."""
-    # A mask may cut one pass in parts, which are contacts of their own.
+    """Return the id that identifies an entry to a calendar from plan to plan."""
+    # A mask may cut a pass into parts, which are separate contacts.
     key = json.dumps([satellite_id, station_id, (middle - _EPOCH) // _HALF_HOUR])
     part = seen[key]
     seen[key] += 1

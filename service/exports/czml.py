@@ -1,7 +1,7 @@
-"""CZML 1.0, for Cesium: satellites on their way, targets by outcome, contacts while they last.
+"""CZML 1.0, for Cesium: satellites on their orbits, targets by outcome, contacts in progress.
 
-Positions are Earth-fixed nodes of the planner's own ephemeris. Between two of them, a minute
-apart, Lagrange polynomials of the fifth degree stay within a metre of it.
+Positions are Earth-fixed nodes of the planner's own ephemeris, a minute apart. Between nodes,
+Lagrange polynomials of the fifth degree are accurate to a metre.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _OUTCOMES: Final = {
     "unscheduled": (231, 76, 60, 255),
     "excluded": (127, 140, 141, 255),
 }
-# Told apart by hue, after Paul Tol's muted scheme.
+# Distinct hues, after Paul Tol's muted scheme.
 _TRACKS: Final = (
     (136, 204, 238), (204, 102, 119), (221, 204, 119), (68, 170, 153), (170, 68, 153),
     (153, 153, 51), (102, 153, 204), (136, 34, 85),
@@ -40,7 +40,7 @@ _TRACKS: Final = (
 
 @chunked
 def write(answered: Answered) -> Iterator[str]:
-    """Yield an array of packets, the document's own first."""
+    """Yield an array of packets, the document packet first."""
     yield "[\n"
     yield from listed(compact(packet) for packet in _packets(answered))
     yield "\n]\n"
@@ -135,7 +135,7 @@ def _target(target: Target, told: Document, names: dict[str, str]) -> Document:
 def _contacts(
     satellite: Document, contacts: list[Document], stations: Iterable[GroundStation]
 ) -> Iterator[Document]:
-    """Yield a line to each station that the satellite talks to, there during its contacts."""
+    """Yield a line to each station that the satellite contacts, shown during its contacts."""
     names = {station.id: station.name for station in stations}
     contacts.sort(key=itemgetter("station_id", "start"))
     for station_id, actions in groupby(contacts, key=itemgetter("station_id")):
@@ -158,7 +158,7 @@ def _contacts(
 
 
 def _reference(packet_id: str) -> str:
-    r"""Return what names the position of another packet.
+    r"""Return the reference to the position of another packet.
 
     >>> print(_reference("station/a#1.b"))
     station/a\#1\.b#position

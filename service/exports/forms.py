@@ -1,4 +1,4 @@
-"""The table of forms: suffix, media type and writer of each."""
+"""The table of formats: suffix, media type and writer of each."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from service.exports import calendar, czml, geojson, openmct, table
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form other than the timeline document itself.
+    """A format other than the timeline document itself.
 
     Attributes
     ----------
     suffix
         Of the address and of files, without the leading dot.
     about
-        What it is, for the OpenAPI document.
+        Description for the OpenAPI document.
     has_own_type
-        Whether ``Accept`` can ask for it; otherwise only the suffix does.
+        Whether ``Accept`` can select it; otherwise only the suffix does.
     """
 
     suffix: str
@@ -36,7 +36,7 @@ FORMS: tuple[Form, ...] = (
         "geojson", "application/geo+json", "targets with outcome, ground tracks, stations",
         geojson.write,
     ),
-    # CZML has no registered type; Cesium asks for none.
+    # CZML has no registered media type; Cesium does not require one.
     Form(
         "czml", "application/json", "satellites, targets and contacts for Cesium", czml.write,
         has_own_type=False,

@@ -1,4 +1,4 @@
-"""GeoJSON (RFC 7946): targets with their outcome, ground tracks, stations and where they reach."""
+"""GeoJSON (RFC 7946): targets with outcomes, ground tracks, stations and their visibility."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from service.exports.antimeridian import Piece, area, pieces_of_line
 from service.wire.instants import instant_text
 
 TRACK_STEP_S = 30.0
-_DECIMALS = 4  # of a degree: eleven metres
+_DECIMALS = 4  # of a degree: 11 metres
 _CLASS_KM = 10.0
 _INSTANTS: Final = ("start", "end", "delivered_at")
 _OF_IMAGES: Final = ("quality", "clear_probability")  # from 0 to 1
@@ -36,7 +36,7 @@ def write(answered: Answered) -> Iterator[str]:
     names = ("job", "scenario_sha256", "plan_sha256", "horizon")
     head = {name: answered.head[name] for name in names}
     yield f'{{"type":"FeatureCollection",{compact(head)[1:-1]},"features":[\n'
-    # A loop would hold each feature until the next one is there.
+    # A loop would hold each feature until the next one exists.
     yield from listed(map(compact, _features(answered)))
     yield "\n]}\n"
 
@@ -65,7 +65,7 @@ def _feature(kind: str, own_id: str, geometry: Document, **properties: object) -
 
 
 def _point(lon_deg: float, lat_deg: float) -> Document:
-    # Catalogues may count longitudes to 360.
+    # Catalogues may give longitudes up to 360.
     lon = lon_deg - 360.0 if lon_deg > 180.0 else lon_deg
     return {"type": "Point", "coordinates": [round(lon, 7), round(lat_deg, 7)]}
 
@@ -100,20 +100,20 @@ def _targets(answered: Answered) -> Iterator[Document]:
 
 
 class _Actions:
-    """When actions begin and end, how good their images are, and when those are on the ground.
+    """Start and end of actions, the figures of their images, and when those are delivered.
 
-    As small numbers alone, for there may be very many: milliseconds from the horizon's start, and
-    shares in ten thousandths.
+    Stored only as small numbers, since there may be very many: milliseconds from the horizon's
+    start, and shares in ten-thousandths.
     """
 
     def __init__(self, answered: Answered):
         self._start = answered.question.horizon.start
-        # Action ids count through all satellites: a1, a2, ...
+        # Action ids are numbered through all satellites: a1, a2, ...
         each = (self._numbers(action) for _, action in answered.each_action())
         self._told = np.fromiter(each, dtype=_TOLD)
 
     def of(self, action_id: str | None) -> Document:
-        """Return what is told of an action; null where nothing is known, or there is none."""
+        """Return what is known of an action; null for what is not, or if there is none."""
         if action_id is None:
             return dict.fromkeys(_INSTANTS + _OF_IMAGES)
         numbers = self._told[int(action_id.removeprefix("a")) - 1].item()
@@ -122,7 +122,7 @@ class _Actions:
         return instants | {name: _share(told[name]) for name in _OF_IMAGES}
 
     def _numbers(self, action: Document) -> tuple[int, ...]:
-        # Answers of the first release say nothing of images.
+        # Answers of the first release have no figures of images.
         instants, shares = ([action.get(n) for n in names] for names in (_INSTANTS, _OF_IMAGES))
         return (
             *(_NEVER if at is None else self._ms(at) for at in instants),
@@ -186,7 +186,7 @@ def _coordinates(piece: Piece) -> list[list[float]]:
 
 
 def _instants(horizon: Horizon, t_s: npt.NDArray[np.float64]) -> list[str]:
-    """Return the texts of many instants at once; `instant_text` of each would take seconds."""
+    """Return the texts of many instants at once; `instant_text` for each would take seconds."""
     start = np.datetime64(horizon.instant(0.0).replace(tzinfo=None), "ms")
     instants = start + np.rint(t_s * 1000.0).astype("timedelta64[ms]")
     texts: list[str] = np.datetime_as_string(instants, timezone="UTC").tolist()

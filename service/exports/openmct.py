@@ -1,6 +1,6 @@
 """The plan file of Open MCT: a group for each satellite and mode, instants in milliseconds.
 
-The form is that of its plan plugin: an object of groups, each a list of activities with name,
+The format is that of its plan plugin: an object of groups, each a list of activities with name,
 start, end, type, color and textColor. An ``id`` lets Open MCT keep an activity's status.
 """
 
@@ -26,16 +26,16 @@ _MILLISECOND: Final = timedelta(milliseconds=1)
 
 @chunked
 def write(answered: Answered) -> Iterator[str]:
-    """Yield the plan; groups that would be empty are left out."""
+    """Yield the plan without empty groups."""
     stations = {station.id: station.name for station in answered.question.ground_stations}
     names = Counter(satellite["name"] for satellite in answered.satellites)
     yield "{\n"
     separator = ""
     for number, satellite in enumerate(answered.satellites):
-        # Group names are keys: two satellites of one name are told apart by their ids.
+        # Group names are keys: satellites with the same name are distinguished by id.
         is_unique = names[satellite["name"]] == 1
         title = satellite["name"] if is_unique else f"{satellite['name']} ({satellite['id']})"
-        # Read once for each mode: a group is written before the next one begins.
+        # Actions are read once per mode: a group must be complete before the next one begins.
         for mode, (words, color, text_color) in _MODES.items():
             group = f"{title}: {words}"
             before = f"{separator}{compact(group)}:["

@@ -22,7 +22,7 @@ COLUMNS = (
 
 @chunked
 def write_csv(passes: Iterable[PassOut]) -> Iterator[str]:
-    """Yield one row for each pass."""
+    """Yield one row per pass."""
     yield line(COLUMNS)
     for one in passes:
         told = dumped(one) | {
@@ -38,14 +38,14 @@ def write_csv(passes: Iterable[PassOut]) -> Iterator[str]:
 def write_ics(
     passes: Iterable[PassOut], stations: Mapping[str, GroundStation], made_at: datetime
 ) -> Iterator[str]:
-    """Yield a calendar with an entry for each pass.
+    """Yield a calendar with an entry per pass.
 
     Parameters
     ----------
     stations
         By id.
     made_at
-        When the plan was made: of two calendars, the newer one counts.
+        When the plan was made: of two calendars, the newer counts.
     """
     head, tail = around("Passes")
     yield head

@@ -1,8 +1,8 @@
-"""CSV (RFC 4180): one row for each action, sun-pointing included.
+"""CSV (RFC 4180): one row per action, including sun-pointing.
 
-Spreadsheets run a cell that begins with =, +, - or @. Texts that do are written behind an
-apostrophe, as spreadsheets themselves show text, and so are those that begin with apostrophes
-and then such a sign: reading takes exactly one apostrophe away, and no id is lost.
+Spreadsheets execute a cell that begins with =, +, - or @. An apostrophe is put before such texts,
+as spreadsheets themselves mark text, and also before texts that begin with apostrophes followed by
+such a sign: reading removes exactly one apostrophe, so that no id is changed.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ def write(answered: Answered) -> Iterator[str]:
             "station_name": _station_name(answered, action),
             **{f"slew_{name}": value for name, value in (action["slew"] or {}).items()},
         }
-        # Answers of earlier releases do not have all columns.
+        # Answers of earlier releases lack some columns.
         yield line(told.get(name) for name in COLUMNS)
 
 
 def _station_name(answered: Answered, action: Document) -> str | None:
     if action["station_id"] is None or "station_name" in action:
         return action.get("station_name")
-    # Answers of the first release have no names of stations; their questions do.
+    # Answers of the first release lack names of stations; their scenarios have them.
     stations = answered.question.ground_stations
     return next((one.name for one in stations if one.id == action["station_id"]), None)
 
 
 def line(cells: Iterable[object]) -> str:
-    """Return a line of a table; texts that a spreadsheet would run are guarded."""
+    """Return a line of a table, guarding texts that a spreadsheet would execute."""
     written = io.StringIO(newline="")
     safe = (guarded(cell) if isinstance(cell, str) else cell for cell in cells)
     csv.writer(written).writerow(safe)

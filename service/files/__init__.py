@@ -1,1 +1,1 @@
-"""Uploaded files of points and values: from bytes to records, every fault with its place."""
+"""Uploaded files of points and values: from bytes to records, each fault with its location."""

@@ -1,4 +1,4 @@
-"""Files of points, CSV and GeoJSON: from bytes to checked bodies, every fault with its place."""
+"""CSV and GeoJSON files of points: from bytes to checked bodies, each fault with its location."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class Record:
     row
         Line of the file where it starts, for CSV.
     pointer
-        Where its fields stand, for JSON.
+        Location of its fields, for JSON.
     pointers
-        Where those stand that stand elsewhere.
+        Locations of fields that are elsewhere.
     """
 
     fields: Mapping[str, object]
@@ -53,7 +53,7 @@ class Record:
     pointers: Mapping[str, str] = field(default_factory=dict)
 
     def place(self, fault: Fault) -> Fault:
-        """Return a fault of one field with its place in the file."""
+        """Return a fault of one field with its location in the file."""
         name = (fault.pointer or "").removeprefix("/").partition("/")[0]
         if self.row is None:
             own = f"{self.pointer}/{name}" if name else self.pointer
@@ -64,7 +64,7 @@ class Record:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Records:
-    """What a file holds; ``ignored`` are columns that are none of ours."""
+    """The content of a file; ``ignored`` lists unknown columns."""
 
     records: tuple[Record, ...] = ()
     faults: tuple[Fault, ...] = ()
@@ -83,17 +83,17 @@ class Checked(Generic[B]):
 def check(
     records: Sequence[Record], schema: type[B], build: Callable[[B], object]
 ) -> tuple[list[Checked[B]], list[Fault]]:
-    """Return the bodies that fit, and what is wrong with the others.
+    """Return the bodies that fit, and the faults of the others.
 
     Parameters
     ----------
     build
-        Makes the domain's type of a body, which has the last word on its values.
+        Makes the domain type from a body, which makes the final check of its values.
 
     Raises
     ------
     ServiceError
-        ``too_many_errors``: so many that it is another kind of file altogether.
+        ``too_many_errors``: so many that the file must be of another kind.
     """
     good: list[Checked[B]] = []
     faults: list[Fault] = []
@@ -130,13 +130,13 @@ def _with_hint(fault: Fault, fields: Mapping[str, object]) -> Fault:
 def read_csv(
     data: bytes, known: Collection[str], required: Collection[str], *, most: int
 ) -> Records:
-    """Return the records of a CSV file with a header, which may have ``most`` of them.
+    """Return the records, at most ``most``, of a CSV file with a header.
 
-    Columns may stand in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
-    ``longitude`` are taken too, and ``city`` where there is no ``name``. Other columns are
-    ignored, unless they look like a misspelt one. An empty cell means the default. Cells are parted
-    by commas, or by semicolons or tabs where the header shows it; there a comma may be the decimal
-    sign.
+    Columns may be in any order; ``lat``, ``latitude``, ``lon``, ``lng``, ``long`` and
+    ``longitude`` are accepted too, and ``city`` if there is no ``name``. Other columns are
+    ignored, unless they look like a misspelt one. An empty cell means the default. Cells are
+    separated by commas, or by semicolons or tabs if the header shows it; in the latter case, a
+    comma may be the decimal sign.
     """
     try:
         table, line, columns = open_table(data, required)
@@ -169,7 +169,7 @@ def read_csv(
 
 
 class NoTable(Exception):
-    """A file holds no table; ``fault`` says why."""
+    """A file does not hold a table; ``fault`` says why."""
 
     def __init__(self, code: str, detail: str, row: int | None = None):
         super().__init__(detail)
@@ -177,7 +177,7 @@ class NoTable(Exception):
 
 
 def open_table(data: bytes, required: Collection[str]) -> tuple[Table, int, list[str]]:
-    """Return the table of a file, the line of its header, and our names of its columns."""
+    """Return the table in a file, the line of its header, and our names of its columns."""
     text = decoded(data)
     if isinstance(text, Fault):
         raise NoTable(text.code, text.detail)
@@ -197,7 +197,7 @@ def open_table(data: bytes, required: Collection[str]) -> tuple[Table, int, list
 def column_names(header: Sequence[str]) -> list[str]:
     """Return our names of a file's columns."""
     names = [cell.strip().lower() for cell in header]
-    # Lists of cities call the name so.
+    # Lists of cities use this column for the name.
     aliases = _ALIASES if "name" in names else _ALIASES | {"city": "name"}
     return [aliases.get(name, name) for name in names]
 
@@ -210,7 +210,7 @@ def _too_many_rows(most: int) -> Records:
 def faults_of_header(
     row: int, columns: Sequence[str], known: Collection[str], required: Collection[str]
 ) -> list[Fault]:
-    """Return columns given twice, misspelt or missing; ``row`` is the line of the header."""
+    """Return faults for columns given twice, misspelt or missing; ``row`` is the header's line."""
     faults = []
     for position, column in enumerate(columns):
         missing = [name for name in known if name not in columns]
@@ -235,12 +235,12 @@ def _value(column: str, cell: str, table: Table) -> object:
     cell = table.number(cell)
     if column == "antennas" and _WHOLE.fullmatch(cell):
         return int(cell)
-    # What is no number stays text, which the schema refuses by name.
+    # What is not a number stays text, so that the schema refuses it by name.
     return float(cell) if _NUMBER.fullmatch(cell) else cell
 
 
 def read_json(data: bytes) -> Any:
-    """Return a JSON document; 422 where it is none."""
+    """Return a JSON document; 422 if the data is not JSON."""
     try:
         return json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
@@ -250,7 +250,7 @@ def read_json(data: bytes) -> Any:
 def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:
     """Return the points of a GeoJSON FeatureCollection (RFC 7946: longitude, latitude, altitude).
 
-    Of a feature's properties those that are fields of ours count; others are ignored.
+    Properties of a feature that are fields of ours are used; others are ignored.
     """
     text = decoded(data)
     if isinstance(text, Fault):

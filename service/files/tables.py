@@ -1,4 +1,4 @@
-"""CSV as it comes: its encoding, what stands between its cells, and its decimal sign."""
+"""Any CSV: its encoding, its delimiter, and its decimal sign."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Table:
 
     @property
     def rows(self) -> Iterator[tuple[int, list[str]] | Fault]:
-        """Yield the rows, and a fault for each that is none."""
+        """Yield the rows, and a fault for each malformed one."""
         reader = csv.reader(
             io.StringIO(self.text, newline=""), strict=True, delimiter=self.delimiter
         )
@@ -44,9 +44,9 @@ class Table:
                 yield start, cells
 
     def number(self, cell: str) -> str:
-        """Return a cell with the point as its decimal sign.
+        """Return a cell with a point as its decimal sign.
 
-        A comma is one only where it does not part cells and stands alone: ``1.234,5`` stays.
+        A comma counts only if it is not the delimiter and the only sign: ``1.234,5`` stays.
 
         >>> Table("", ";").number("-3,25"), Table("", ";").number("1.234,5")
         ('-3.25', '1.234,5')
@@ -63,15 +63,15 @@ def has_decimal_comma(cell: str) -> bool:
 def read_table(
     text: str, columns_of: Callable[[Sequence[str]], Collection[str]], required: Collection[str]
 ) -> Table:
-    """Return the table of a text.
+    """Return the table in a text.
 
-    Cells are parted by commas, unless the header has all that is required only if semicolons
-    or tabs part them.
+    Cells are separated by commas, unless the header has all required columns only with
+    semicolons or tabs as delimiters.
 
     Parameters
     ----------
     columns_of
-        Returns the names that the cells of a header mean.
+        Returns our names of the cells of a header.
     """
     comma = Table(text, _COMMA)
     for table in (comma, *(Table(text, delimiter) for delimiter in _OTHER_DELIMITERS)):
@@ -82,7 +82,7 @@ def read_table(
 
 
 def decoded(data: bytes) -> str | Fault:
-    """Return the text of a file: UTF-8, or UTF-16 where its first bytes say so."""
+    """Return the text of a file: UTF-8, or UTF-16 if its first bytes say so."""
     try:
         return data.decode("utf-16" if data.startswith(_WIDE) else "utf-8-sig")
     except UnicodeDecodeError as error:

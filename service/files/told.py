@@ -1,4 +1,4 @@
-"""Which form a file has, by what it begins with: for clients that send bytes alone."""
+"""The form of a file, detected from its beginning, for clients that send only bytes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _JSON: Final = re.compile(r"\s*[{\[]")
 _XML: Final = re.compile(r"\s*<")
 _BINARY: Final = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")
 _COLLECTION: Final = re.compile(r'"type"\s*:\s*"FeatureCollection"')
-# Keywords of an OMM stand in a row here, and each in a line of its own in its KVN form.
+# A CSV file has the keywords of an OMM in one line, its KVN form has one keyword per line.
 _OMM_HEADER: Final = re.compile(r"(?=[^\n]*[,;\t])[^\n]*(NORAD_CAT_ID|MEAN_MOTION)", re.IGNORECASE)
 
 
 def media_type_told(data: bytes, allowed: Collection[str]) -> str:
-    """Return which of some media types a file has.
+    """Return which of the allowed media types a file has.
 
     >>> files = ("application/json", "text/csv", "text/plain")
     >>> media_type_told(b"[]", files), media_type_told(b"1 25544U 98067A", files)
@@ -41,6 +41,6 @@ def _text(data: bytes) -> str:
 
 
 def _first(allowed: Collection[str], *ends: str) -> str:
-    """Return the first of the allowed ones with one of these ends, in their order."""
+    """Return the first allowed media type that has one of these ends, trying the ends in order."""
     found = (kind for end in ends for kind in allowed if kind.endswith(end))
     return next(found, "text/csv")

@@ -1,1 +1,1 @@
-"""Forecasts of clear skies: files read, kept, and asked for the targets of a question."""
+"""Forecasts of clear skies: read from files, stored, and evaluated for a scenario's targets."""

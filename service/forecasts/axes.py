@@ -1,4 +1,4 @@
-"""What latitudes and longitudes of a grid must be like."""
+"""Requirements on the latitudes and longitudes of a grid."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from planner_core.errors import Fault
 from service.forecasts.fields import Floats
 
 _LON_TOLERANCE: Final = 0.02
-"""Of a step: files write longitudes as rounded numbers."""
+"""As a share of a step: files hold rounded longitudes."""
 _LAT_RATIO: Final = 2.0
-"""Between the greatest and the least step: Gaussian grids are nearly even."""
+"""Between the largest and the smallest step: Gaussian grids are nearly even."""
 
 
 def fault_of_axes(lat_deg: Floats, lon_deg: Floats) -> Fault | None:
-    """Return what is wrong with a grid's axes, which ascend; None where nothing is."""
+    """Return the fault of a grid's ascending axes, or None."""
     if lat_deg[0] < -90.0 or lat_deg[-1] > 90.0:
         return _fault("latitudes lie between -90 and 90.")
     if lon_deg[-1] - lon_deg[0] > 360.0 or lon_deg[0] < -360.0 or lon_deg[-1] > 720.0:
@@ -38,7 +38,7 @@ def fault_of_axes(lat_deg: Floats, lon_deg: Floats) -> Fault | None:
 
 
 def unwrapped(lon_deg: Floats, value: npt.NDArray[Any]) -> tuple[Floats, npt.NDArray[Any]]:
-    """Return the grid without a last column that is the first one again, 360 degrees on."""
+    """Return the grid without a last column that repeats the first, 360 degrees further."""
     if len(lon_deg) > 1 and abs(lon_deg[-1] - lon_deg[0] - 360.0) < 1e-6:
         return lon_deg[:-1], value[..., :-1]
     return lon_deg, value

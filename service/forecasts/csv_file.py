@@ -32,7 +32,7 @@ _ID: Final[TypeAdapter[str]] = TypeAdapter(Id)
 
 
 def read_csv(data: bytes) -> tuple[Field, list[str]]:
-    """Return what a file says, and notes on how it was read.
+    """Return the forecast in a file, and notes on how it was read.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def read_csv(data: bytes) -> tuple[Field, list[str]]:
 
 
 class _Table:
-    """The cells that are wanted, column by column, and what is wrong with the others."""
+    """The wanted cells, column by column, and the faults of the others."""
 
     def __init__(self, wanted: tuple[str, ...], positions: list[int], form: Table):
         self.columns: dict[str, list[Any]] = {name: [] for name in wanted}
@@ -66,7 +66,7 @@ class _Table:
         self.faults: list[Fault] = []
         self._places = list(zip(wanted, positions, strict=True))
         self._read: dict[str, Callable[[str], Any]] = {
-            # There are few instants and targets, and many lines.
+            # Many lines share few instants and targets.
             "time": cache(lambda cell: time_ms_of(_valid(_INSTANT, cell))),
             "target_id": cache(lambda cell: _valid(_ID, cell)),
             "lat_deg": lambda cell: _number(form.number(cell), -90.0, 90.0),
@@ -147,7 +147,7 @@ def _grid(table: _Table) -> Grid:
 
 
 def _first_twice(places: tuple[Any, ...], shape: tuple[int, ...]) -> int | None:
-    """Return which record names a place of the grid that an earlier one has named."""
+    """Return which record repeats a grid point of an earlier one."""
     flat = np.ravel_multi_index(places, shape)
     _, first = np.unique(flat, return_index=True)
     if len(first) == len(flat):

@@ -1,6 +1,6 @@
-"""What an uploaded forecast says: probabilities of a clear sky on a grid, or by target.
+"""The content of an uploaded forecast: probabilities of a clear sky on a grid, or by target.
 
-Instants are milliseconds since 1970, in UTC; probabilities whole multiples of 1/10,000.
+Instants are milliseconds since 1970, in UTC; probabilities are whole multiples of 1/10,000.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ Floats = npt.NDArray[np.float64]
 Shares = npt.NDArray[np.uint16]
 
 WHOLE: Final = 10_000
-"""Parts of a probability."""
+"""Units per probability of 1."""
 MISSING: Final = 65_535
-"""Where a file has no value."""
+"""Marks a missing value in a file."""
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 _LEAST_DEG: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skies:
-    """Clear skies over some targets at the same instants.
+    """Probabilities of clear skies over some targets at shared instants.
 
     Attributes
     ----------
     target
-        Which of the targets that were asked for. Shape ``(m,)``.
+        Indices into the targets asked for. Shape ``(m,)``.
     time_ms
         Ascending. Shape ``(k,)``.
     clear_probability
@@ -48,7 +48,7 @@ class Skies:
 
 
 class _Timed:
-    """What has values at some instants."""
+    """Something with values at some instants."""
 
     __slots__ = ()
     time_ms: Longs
@@ -71,9 +71,9 @@ class Grid(_Timed):
     Attributes
     ----------
     time_ms, lat_deg, lon_deg
-        Ascending; longitudes span less than 360 degrees, wherever they begin.
+        Ascending; longitudes span less than 360 degrees, with any first value.
     value
-        In parts of ``WHOLE``, or ``MISSING``. Shape ``(len(time_ms), len(lat_deg), len(lon_deg))``.
+        In 1/``WHOLE`` or ``MISSING``. Shape ``(len(time_ms), len(lat_deg), len(lon_deg))``.
     """
 
     time_ms: Longs
@@ -82,7 +82,7 @@ class Grid(_Timed):
     value: Shares
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """Return all that it says, as arrays."""
+        """Return its content as arrays."""
         return {
             "time_ms": self.time_ms,
             "lat_deg": self.lat_deg,
@@ -104,7 +104,7 @@ class Grid(_Timed):
     def over(
         self, ids: Sequence[str], lat_deg: Floats, lon_deg: Floats, start_ms: int, end_ms: int
     ) -> list[Skies]:
-        """Return the skies over targets, bilinear between grid points."""
+        """Return the skies over targets, with bilinear interpolation between grid points."""
         span = within(self.time_ms, start_ms, end_ms)
         clear = self.at(lat_deg, lon_deg, span)
         known = np.flatnonzero(~np.isnan(clear).any(axis=1))
@@ -112,14 +112,14 @@ class Grid(_Timed):
         return [Skies(known, time_ms, clear[known])] if len(known) and len(time_ms) else []
 
     def at(self, lat_deg: Floats, lon_deg: Floats, span: slice) -> Floats:
-        """Return the probabilities over places, at the instants of a span.
+        """Return the probabilities over points, at the instants of a slice.
 
-        A grid that goes round the globe has no edge in longitude; one whose last row is at most
-        one step from a pole holds that row's value to the pole.
+        A grid around the globe has no edge in longitude; if its last row is at most one step from a
+        pole, that row's value holds up to the pole.
 
         Returns
         -------
-        Shape ``(len(lat_deg), len(span))``; NaN outside the grid and beside missing values.
+        Shape ``(len(lat_deg), len(span))``; NaN outside the grid and next to missing values.
         """
         row, row_share = _cells(self.lat_deg, _up_to_the_poles(self.lat_deg, lat_deg))
         lon_axis, last = self.lon_deg, len(self.lon_deg)
@@ -139,7 +139,7 @@ class Grid(_Timed):
 
 
 def goes_round(lon_deg: Floats) -> bool:
-    """Return whether the grid's last column is next to its first one."""
+    """Return whether the grid's last column is adjacent to its first."""
     if len(lon_deg) < 2:
         return False
     step_deg = (lon_deg[-1] - lon_deg[0]) / (len(lon_deg) - 1)
@@ -147,7 +147,7 @@ def goes_round(lon_deg: Floats) -> bool:
 
 
 def _up_to_the_poles(axis_deg: Floats, lat_deg: Floats) -> Floats:
-    """Return latitudes brought back to a last row that is next to a pole."""
+    """Return latitudes, with those beyond a last row next to a pole moved to that row."""
     if len(axis_deg) < 2:
         return lat_deg
     near_south = axis_deg[0] + 90.0 <= axis_deg[1] - axis_deg[0]
@@ -157,7 +157,7 @@ def _up_to_the_poles(axis_deg: Floats, lat_deg: Floats) -> Floats:
 
 
 def _cells(axis_deg: Floats, at_deg: Floats) -> tuple[Longs, Floats]:
-    """Return the grid point before each place and how far the place is to the next, NaN outside."""
+    """Return the grid point before each point, and its share of the step (NaN outside)."""
     last = len(axis_deg) - 1
     left = np.clip(np.searchsorted(axis_deg, at_deg, side="right") - 1, 0, max(last - 1, 0))
     step_deg = axis_deg[np.minimum(left + 1, last)] - axis_deg[left]
@@ -169,16 +169,16 @@ def _cells(axis_deg: Floats, at_deg: Floats) -> tuple[Longs, Floats]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByTarget(_Timed):
-    """Values of each target at instants of its own.
+    """Values of each target at its own instants.
 
     Attributes
     ----------
     ids
-        Of the targets.
+        Ids of the targets.
     first
-        Where each one's values begin, and at last where they end. Shape ``(len(ids) + 1,)``.
+        Where each target's values begin, then where the last end. Shape ``(len(ids) + 1,)``.
     time_ms, value
-        Of all targets; instants ascend for each of them.
+        For all targets; instants ascend for each of them.
     """
 
     ids: tuple[str, ...]
@@ -187,7 +187,7 @@ class ByTarget(_Timed):
     value: Shares
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
-        """Return all that it says, as arrays."""
+        """Return its content as arrays."""
         ids = np.frombuffer(json.dumps(self.ids).encode(), dtype=np.uint8)
         return {"ids": ids, "first": self.first, "time_ms": self.time_ms, "value": self.value}
 
@@ -203,7 +203,7 @@ class ByTarget(_Timed):
     def over(
         self, ids: Sequence[str], lat_deg: Floats, lon_deg: Floats, start_ms: int, end_ms: int
     ) -> list[Skies]:
-        """Return the skies over targets; those with the same instants together."""
+        """Return the skies over targets, grouped by targets with the same instants."""
         own = {target_id: number for number, target_id in enumerate(self.ids)}
         groups: dict[bytes, list[tuple[int, Shares]]] = {}
         for position, target_id in enumerate(ids):
@@ -229,7 +229,7 @@ Field = Grid | ByTarget
 
 
 def within(time_ms: Longs, start_ms: int, end_ms: int) -> slice:
-    """Return which ascending instants tell all of a span: those in it, and one on either side."""
+    """Return the ascending instants needed for a time span: those in it, and one on each side."""
     if time_ms[-1] < start_ms or time_ms[0] > end_ms:
         return slice(0, 0)
     first = max(int(np.searchsorted(time_ms, start_ms, side="right")) - 1, 0)
@@ -243,7 +243,7 @@ def time_ms_of(instant: datetime) -> int:
 
 
 def instant_of(time_ms: int) -> datetime:
-    """Return the instant so many milliseconds after 1970."""
+    """Return the instant this many milliseconds after 1970."""
     return _EPOCH + timedelta(milliseconds=time_ms)
 
 
@@ -265,7 +265,7 @@ def from_bytes(stored: bytes) -> Field:
 
 
 def sha256_of(field: Field) -> str:
-    """Return a hash of what a forecast says, whatever form it came in."""
+    """Return a hash of a forecast's content, whatever file format it came in."""
     digest = hashlib.sha256()
     for name, values in field.columns().items():
         digest.update(f"{name} {values.dtype.str} {values.shape}\n".encode())
