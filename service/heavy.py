@@ -1,11 +1,11 @@
-"""The process that does what is heavy: the same application, behind ``service.api.bulkhead``.
+"""The process for heavy requests: the same application, behind ``service.api.bulkhead``.
 
-Its memory is watched. When it holds too much it is ended, with all that it was doing, and
-a new one begins: the API beside it goes on.
+Its memory is watched. If it holds too much, it is killed with all its work, and a new one
+begins, while the API goes on.
 
 A fork server between the two is itself forked from the API before anything is opened and any
-thread begins. It watches the heavy process and forks a new one whenever one has ended: each finds
-everything imported. The fork server of ``multiprocessing`` would import it all once more.
+thread begins. It watches the heavy process and forks a new one when one has ended, so that each
+finds everything imported. The fork server of ``multiprocessing`` would import everything again.
 """
 
 from __future__ import annotations
@@ -41,25 +41,25 @@ _NICENESS: Final = 10
 
 
 class HeavyProcess:
-    """Keeps such a process running.
+    """Keeps a heavy process running.
 
     Make one before any thread begins, ``start`` it when the database is ready, and ``close`` it.
 
     Attributes
     ----------
     path
-        The socket file at which it listens.
+        The socket file on which it listens.
     """
 
     def __init__(self, settings: Settings) -> None:
-        # A folder of our own: nobody else may reach who believes whatever caller is named.
+        # A private folder: the heavy process trusts whoever can reach it to name the caller.
         self._folder = tempfile.TemporaryDirectory(prefix="slewline-")
         self.path = str(Path(self._folder.name) / "heavy")
         with socket.socket(socket.AF_UNIX) as listener:
             listener.bind(self.path)
             listener.listen(128)
             theirs, self._pipe = _FORK.Pipe(duplex=False)
-            # What is there now is never collected, so that its pages stay common: 90 MB less.
+            # Existing objects are never collected, so that their pages stay shared: 90 MB less.
             gc.freeze()
             self._fork_server = _FORK.Process(
                 target=_keep_running, args=(settings, listener, theirs, self._pipe)
@@ -68,16 +68,16 @@ class HeavyProcess:
         theirs.close()
 
     def start(self) -> None:
-        """Let it begin."""
+        """Let the heavy process begin."""
         with suppress(BrokenPipeError):
             self._pipe.send(None)
 
     def is_watched(self) -> bool:
-        """Return whether the fork server is alive, without which no new one would begin."""
+        """Return whether the fork server is alive, which must start any new heavy process."""
         return self._fork_server.is_alive()
 
     def close(self) -> None:
-        """End it, and the fork server."""
+        """End the heavy process and the fork server."""
         self._pipe.close()
         self._fork_server.join()
         self._folder.cleanup()
@@ -92,8 +92,8 @@ def _keep_running(
     """Keep one running from the first message in the pipe until the pipe is closed."""
     other_end.close()
     name_this_process("slewline-fork")
-    # In a session of its own, so that Ctrl-C reaches the API alone; what a library prints must
-    # not be taken for words of the service.
+    # In a session of its own, so that Ctrl-C reaches only the API. A library's prints go to
+    # stderr, since stdout is for the service's own output.
     os.setsid()
     os.dup2(STDERR, 1)
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -103,7 +103,7 @@ def _keep_running(
     except EOFError:
         return
     configure_logging()
-    # Requests wait in the listener while there is no process.
+    # Requests wait in the listener while there is no heavy process.
     while True:
         process = _FORK.Process(target=_serve, args=(settings, listener))
         process.start()
@@ -114,7 +114,7 @@ def _keep_running(
 
 
 def _watch(process: BaseProcess, pipe: Connection[Any, Any], most_mb: float) -> bool:
-    """Return True when the process has ended, or end it and return False as the pipe closes."""
+    """Return True when the process has ended; when the pipe closes, end it and return False."""
     while process.is_alive():
         if pipe in wait([pipe, process.sentinel], _LOOK_EVERY_S):
             process.terminate()
@@ -130,10 +130,10 @@ def _watch(process: BaseProcess, pipe: Connection[Any, Any], most_mb: float) -> 
 
 
 def _serve(settings: Settings, listener: socket.socket) -> None:
-    """Serve on a socket until SIGTERM, or until the parent is gone."""
+    """Serve on a socket until SIGTERM, or until the parent has ended."""
     die_with_parent(signal.SIGTERM)
     name_this_process("slewline-heavy")
-    os.nice(_NICENESS)  # whatever is light goes first
+    os.nice(_NICENESS)  # light requests go first
     provider = start_tracing(settings, "api")
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     app = create_app(settings, queue, is_heavy=True)

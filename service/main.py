@@ -1,4 +1,4 @@
-"""The HTTP application, put together."""
+"""Assembly of the HTTP application."""
 
 from __future__ import annotations
 
@@ -89,25 +89,25 @@ def create_app(
     settings
         The configuration of this process.
     queue
-        Where jobs are sent; without one the service takes none.
+        Where jobs are sent; without it the service accepts none.
     heavy
-        Socket file of a process that is given what is heavy; without one it is done here.
+        Socket file of a process for heavy requests; without it they are handled here.
     is_heavy
-        This is that process: who calls it has been let in by another one.
+        Whether this is that process, whose callers another process has already admitted.
     """
     app = FastAPI(
         title="Slewline",
         version=planner_core.__version__,
         description=DESCRIPTION,
-        openapi_url=None,  # service.api.openapi has routes of its own
-        docs_url=None,  # FastAPI's own pages load scripts from the internet
+        openapi_url=None,  # service.api.openapi has its own routes
+        docs_url=None,  # FastAPI's pages load scripts from the internet
         redoc_url=None,
         lifespan=_lifespan,
         dependencies=[Depends(check_request)],
         redirect_slashes=False,
-        # What generated clients call an operation.
+        # Names of operations in generated clients.
         generate_unique_id_function=attrgetter("name"),
-        # Spans where service.process.tracing has set them up; metrics and logs are our own.
+        # Spans only if service.process.tracing has set them up; metrics and logs are our own.
         telemetry={
             "metrics": False,
             "logs": False,
@@ -138,7 +138,7 @@ def create_app(
     app.add_middleware(Polls, state=app.state)
     app.add_middleware(BodyLimit, max_bytes=int(settings.max_body_mb * 1_000_000))
     app.add_middleware(Guard, settings=settings)
-    # What the door, a limit or the bulkhead raises is answered like what routes raise.
+    # Errors of the guard, a limit or the bulkhead are answered like those of routes.
     app.add_middleware(ExceptionMiddleware, handlers=refusals(app))
     if settings.allowed_origins:
         _allow_pages(app, settings.allowed_origins)
@@ -148,7 +148,7 @@ def create_app(
 
 
 def _allow_pages(app: FastAPI, origins: Sequence[str]) -> None:
-    # Before the guard, which would ask a browser's preflight request for a key.
+    # Outside the guard, which would demand a key for a browser's preflight request.
     app.add_middleware(
         CORSMiddleware,
         allow_origins=origins,

@@ -1,4 +1,4 @@
-"""Run the service on this machine: the API in this process, workers beside it."""
+"""Run the service on this machine: the API in this process, and workers in others."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CannotServe(Exception):
 
 
 class NoKey(CannotServe):
-    """Others could reach the service, and nobody holds a key that it would ask them for."""
+    """Others could reach the service, but there is no valid key for it to require."""
 
 
 def prepare_database(settings: Settings) -> None:
@@ -46,12 +46,12 @@ def prepare_database(settings: Settings) -> None:
 
 
 def require_key(settings: Settings) -> None:
-    """Refuse to serve beyond this machine before there is a key.
+    """Refuse to serve beyond this machine until there is a key.
 
     Raises
     ------
     NoKey
-        Where there is none that is good now.
+        If there is no valid key.
     """
     if settings.is_local or settings.static_keys:
         return
@@ -66,12 +66,12 @@ def require_key(settings: Settings) -> None:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a socket bound to the address; port 0 takes a free one.
+    """Return a socket bound to the address; with port 0, to a free port.
 
     Raises
     ------
     CannotServe
-        Where the port is taken, or the host is not one of this machine's addresses.
+        If the port is taken, or the host is not an address of this machine.
     """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -81,20 +81,20 @@ def listen(host: str, port: int) -> socket.socket:
             f"Cannot listen on {host} port {port}: {error.strerror}. "
             "Give another --port; 0 takes a free one."
         ) from error
-    # Connections inherit this. asyncio sets it itself only where a socket names its protocol,
-    # and without it each answer's body waits for the client's delayed acknowledgement (40 ms).
+    # Connections inherit this option. asyncio sets it only if a socket names its protocol, and
+    # without it each answer's body waits for the client's delayed acknowledgement (40 ms).
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return listener
 
 
 def address_of(listener: socket.socket) -> str:
-    """Return the URL under which a listening socket is reached."""
+    """Return the URL of a listening socket."""
     host, port = listener.getsockname()[:2]
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
 def serve(settings: Settings, *, with_workers: bool) -> int:
-    """Serve until SIGTERM or SIGINT, then end all that was started. Return the exit status."""
+    """Serve until SIGTERM or SIGINT, then end everything started. Return the exit status."""
     stop = StopRequest()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.ask())
@@ -141,7 +141,7 @@ def _running_api(
         timeout_graceful_shutdown=_LAST_ANSWERS_WITHIN_S,
     )
     server = uvicorn.Server(config)
-    # In a thread, uvicorn leaves the signals to the one who also has workers to stop.
+    # In a thread, uvicorn leaves signals to the main thread, which must also stop workers.
     thread = threading.Thread(target=server.run, args=([listener],), name="api", daemon=True)
     thread.start()
     try:
@@ -153,7 +153,7 @@ def _running_api(
 
 
 def _wait_for(url: str, is_over: Callable[[], bool]) -> bool:
-    """Return whether the URL answered 200 before it was over."""
+    """Return whether the URL answered 200 before ``is_over``."""
     deadline_s = time.monotonic() + _READY_WITHIN_S
     with httpx.Client(trust_env=False) as client:
         while not is_over():

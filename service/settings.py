@@ -1,4 +1,4 @@
-"""Every setting, read once from the environment (prefix ``SLEWLINE_``) and the command line."""
+"""All settings, read once from the environment (prefix ``SLEWLINE_``) and the command line."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Settings(BaseSettings):
 
     @property
     def scenario_limits(self) -> ScenarioLimits:
-        """Return how large a scenario may be."""
+        """Return the limits on the size of a scenario."""
         return ScenarioLimits(
             horizon_days=self.max_horizon_days,
             num_targets=self.max_targets,
@@ -96,17 +96,17 @@ class Settings(BaseSettings):
 
     @property
     def keys_required(self) -> bool:
-        """Return whether callers must show a key. Beyond this machine there is no way round."""
+        """Return whether callers must show a key; always if other machines can reach the server."""
         return self.require_keys or not self.is_local
 
     @property
     def static_keys(self) -> StaticKeys:
-        """Return the keys of ``api_keys``."""
+        """Return the keys in ``api_keys``."""
         return StaticKeys.parse(self.api_keys.get_secret_value())
 
     @property
     def requests_per_s(self) -> float:
-        """Return how many requests a second a caller may make; 0 stands for any number."""
+        """Return how many requests per second a caller may make; 0 for no limit."""
         if self.rate_limit_per_s is None:
             return 0.0 if self.is_local else _REQUESTS_PER_S
         return self.rate_limit_per_s
@@ -118,9 +118,9 @@ class Settings(BaseSettings):
 
     @property
     def own_hosts(self) -> frozenset[str]:
-        """Return the names by which the service is called, in lower case; "*" for any.
+        """Return the host names under which the service is called, in lower case; "*" for any.
 
-        Addresses need not be named: a page that has another name lead here sends that name.
+        IP addresses need not be listed: a page whose own name resolves here sends its own name.
         """
         own = f"localhost {self.host} {socket.gethostname()} {self.allowed_hosts}"
         return frozenset(own.lower().replace(",", " ").split())
@@ -141,5 +141,5 @@ class Settings(BaseSettings):
 
     @field_serializer("api_keys")
     def _keep(self, _value: SecretStr) -> str:
-        """Leave the keys out of what workers are told: nobody calls them."""
+        """Keep the keys from workers, which nobody calls."""
         return ""

@@ -1,7 +1,7 @@
 """The planning core without a service: a scenario in, a judged plan out.
 
-Apart from the client, whose ``Satellite`` and ``Scenario`` are what a service answers; and
-because this takes a second to import and the client does not.
+Kept apart from the client, whose ``Satellite`` and ``Scenario`` are answers of a service, and
+because the core takes a second to import and the client does not.
 """
 
 from planner_core.budget import Budget, Progress, Termination

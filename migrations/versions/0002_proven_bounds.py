@@ -1,4 +1,4 @@
-"""Proven bounds: the best of each scenario, and each job's with its proof."""
+"""Proven bounds: the best for each scenario, and each job's with its proof."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keys of repeated requests, comparisons, jobs run again, and the figures of answers."""
+"""Idempotency keys, comparisons, jobs run again, and the figures of answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""API keys, and the record of changes, which the database itself keeps from being rewritten."""
+"""API keys, and the record of changes, which database triggers protect from changes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs know the trace that they were queued in."""
+"""Jobs keep the trace in which they were queued."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs know which job they vary, and how."""
+"""Jobs keep the job that they vary, and the change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which request a job came with."""
+"""Jobs keep the request that submitted them."""
 
 from __future__ import annotations
 

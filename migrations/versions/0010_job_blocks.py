@@ -1,4 +1,4 @@
-"""Answers in blocks: pages and exports read what they need."""
+"""Answers in blocks, so that pages and exports read only what they need."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def upgrade() -> None:
         sa.PrimaryKeyConstraint("job_id", "position"),
     )
     connection = op.get_bind()
-    # One answer at a time: all of them may be more than fits into memory.
+    # One answer at a time, since all of them may not fit into memory.
     for job_id in connection.scalars(sa.select(_RESULT.c.job_id)).all():
         columns = (_RESULT.c.timeline, _RESULT.c.targets, _RESULT.c.proof)
         stored = connection.execute(sa.select(*columns).where(_RESULT.c.job_id == job_id)).one()
@@ -92,7 +92,7 @@ def downgrade() -> None:
 
 
 def _blocks(timeline: str, targets: str, proof: str | None) -> Iterator[Block]:
-    """Yield what ``service.answers.blocks`` made of an answer when this was written."""
+    """Yield the blocks of an answer as ``service.answers.blocks`` made them at the time."""
     head = json.loads(timeline)
     satellites = head.pop("satellites")
     yield "head", 0, 0, None, json.dumps(head)[:-1] + ', "satellites": ['

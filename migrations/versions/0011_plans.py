@@ -1,4 +1,4 @@
-"""Plans with a life: approved, published, superseded, reported on."""
+"""Plans in operations: approved, published, superseded, reported on."""
 
 from __future__ import annotations
 

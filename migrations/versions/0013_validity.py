@@ -1,4 +1,4 @@
-"""Whether its plan keeps to the limits, and what there is to be warned of, stand on each job."""
+"""The validity and the warnings of each job's plan, in the job's row."""
 
 from __future__ import annotations
 

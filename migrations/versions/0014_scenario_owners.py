@@ -1,4 +1,4 @@
-"""Scenarios that came with jobs are seen by the owners of those jobs."""
+"""Scenarios that came with jobs are visible to the owners of those jobs."""
 
 from __future__ import annotations
 

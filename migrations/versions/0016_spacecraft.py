@@ -1,4 +1,4 @@
-"""Spacecraft types, and which of them a satellite was made from."""
+"""Spacecraft types, and the type that each satellite was made from."""
 
 from __future__ import annotations
 

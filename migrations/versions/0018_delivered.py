@@ -1,4 +1,4 @@
-"""When a plan brings each image down."""
+"""When a plan downlinks each image."""
 
 from __future__ import annotations
 

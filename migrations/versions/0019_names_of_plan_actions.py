@@ -1,4 +1,4 @@
-"""Names beside the ids of a plan's actions."""
+"""Names in addition to ids in a plan's actions."""
 
 from __future__ import annotations
 

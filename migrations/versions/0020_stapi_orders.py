@@ -1,4 +1,4 @@
-"""Orders that come over STAPI."""
+"""Orders placed through STAPI."""
 
 from __future__ import annotations
 

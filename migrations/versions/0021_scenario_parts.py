@@ -1,4 +1,4 @@
-"""Which satellites and ground stations each scenario has: lists are narrowed by them."""
+"""The satellites and ground stations of each scenario, by which lists are filtered."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of targets beside their ids in a plan's actions, and when a catalogue was changed."""
+"""Names of targets in addition to ids in a plan's actions, and when a catalogue changed."""
 
 from __future__ import annotations
 

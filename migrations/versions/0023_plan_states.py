@@ -1,4 +1,4 @@
-"""Telemetry of a plan's satellites, as it was reported."""
+"""Reported telemetry of a plan's satellites."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Plans with a life: what is stored of them, and where they may go."""
+"""Plans in operations: their storage, and their permitted transitions."""

@@ -1,4 +1,4 @@
-"""A plan's way from draft to published, superseded or withdrawn."""
+"""The transitions of a plan from draft to published, superseded or withdrawn."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from service.wire.plans import TRANSITIONS, PlanState, TransitionIn
 
 
 def move(session: Session, caller: Caller, plan: PlanRow, body: TransitionIn) -> None:
-    """Move a plan to another state; its row is locked, and so is publishing where that is asked.
+    """Move a plan to another state; its row must be locked, and publishing too if requested.
 
     Raises
     ------
     ServiceError
-        The state does not allow it, a waiver is missing, or another plan came in between.
+        If the state does not allow it, a waiver is missing, or another plan was published since.
     """
     allowed = TRANSITIONS[cast(PlanState, plan.state)]
     if body.to not in allowed:
@@ -52,7 +52,7 @@ def move(session: Session, caller: Caller, plan: PlanRow, body: TransitionIn) ->
 
 
 def _require_fields(body: TransitionIn) -> None:
-    """Refuse what this step has no use for: it would be ignored without a word."""
+    """Refuse fields that do not apply to this transition, which would be silently ignored."""
     faults = [
         Fault(code="invalid_value", detail=f"{name} goes with {wanted}.", pointer=f"/{name}")
         for name, wanted, is_given in (
@@ -65,7 +65,7 @@ def _require_fields(body: TransitionIn) -> None:
 
 
 def _require_waivers(plan: PlanRow, body: TransitionIn) -> None:
-    """Refuse an approval that leaves violations unanswered, or waives what there is not."""
+    """Refuse an approval that leaves violations unwaived, or waives one that does not exist."""
     places = {f"/violations/{i}": each["code"] for i, each in enumerate(plan.violations)}
     waived = [each.violation for each in body.waivers]
     faults = [
@@ -85,7 +85,7 @@ def _require_waivers(plan: PlanRow, body: TransitionIn) -> None:
 
 
 def _supersede(session: Session, caller: Caller, plan: PlanRow, from_: datetime) -> None:
-    """Put the plan in force from an instant on, in place of what is so far."""
+    """Put the plan in force from an instant on, replacing the plans in force."""
     if from_ >= plan.horizon_end:
         detail = "The plan's horizon is over by then."
         raise refuse_one("value_out_of_range", detail, "/effective_from")

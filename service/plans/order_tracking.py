@@ -1,4 +1,4 @@
-"""How far orders have come, read from plans and reports like the lives of targets."""
+"""The progress of orders, derived from plans and reports like the progress of targets."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ _ENDS: Final[dict[TargetState, tuple[Code, ...]]] = {
     "expired": ("received", "expired"),
     "cancelled": ("received", "cancelled"),
 }
-"""The way to each state of a target, in STAPI's words."""
+"""The steps to each state of a target, as STAPI status codes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """A status that an order has, or had on its way."""
+    """A present or past status of an order."""
 
     code: Code
     at: datetime
 
 
 def steps_of(session: Session, orders: Sequence[OrderRow]) -> list[list[Step]]:
-    """Return the statuses of each order, in order of time; the last one holds."""
+    """Return the statuses of each order in order of time; the last one is current."""
     now = clock.now(session)
     known: dict[tuple[str, str], tuple[list[str], Lives]] = {}
     found = []
     for order in orders:
         key = order.owner, order.catalog_id
         if key not in known:
-            # Plans of others say nothing of it: catalogues are read by all.
+            # Only the owner's plans count, although anybody may read and plan a catalogue.
             plan_ids = plans_by_catalog(session, order.owner).get(order.catalog_id, [])
             known[key] = plan_ids, lives_of(session, plan_ids)
         found.append(_steps(session, order, *known[key], now))
@@ -73,7 +73,7 @@ def _steps(
         }
     steps: list[Step] = []
     for code in _ENDS[state]:
-        # A plan may be published late, for what has been done already.
+        # A plan may be published only after its actions were done.
         since = steps[-1].at if steps else order.created_at
         steps.append(Step(code=code, at=max(since, at[code] or since)))
     return steps

@@ -1,4 +1,4 @@
-"""What a replan begins with, and the draft that it leaves."""
+"""The starting point of a replan, and the draft that results from it."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _GONE: Final = ("failed", "skipped")
 
 
 def base_of(session: Session, plan_id: str, from_: datetime | None = None) -> list[PinnedActionIn]:
-    """Return the actions of a plan, in words, less those that were reported as not done.
+    """Return the actions of a plan, without those reported as not done.
 
-    With an instant those that end after it, as far as they do.
+    Given an instant, only the parts of actions after it.
     """
     last = store.last_reports(session, plan_id)
     gone = {own_id for own_id, report in last.items() if report.outcome in _GONE}
@@ -38,7 +38,7 @@ def base_of(session: Session, plan_id: str, from_: datetime | None = None) -> li
 
 
 def flown_of(session: Session, plan_id: str, until: datetime) -> list[FlownIn]:
-    """Return the actions of a plan that began before an instant, and what became of them."""
+    """Return the actions of a plan that began before an instant, with their outcomes."""
     last = store.last_reports(session, plan_id)
     found = []
     for row in all_actions(session, plan_id):
@@ -51,13 +51,13 @@ def flown_of(session: Session, plan_id: str, until: datetime) -> list[FlownIn]:
 
 
 def all_actions(session: Session, plan_id: str) -> list[PlanActionRow]:
-    """Return the actions of a plan, in their order."""
+    """Return the actions of a plan, in order."""
     wanted = sa.select(PlanActionRow).where(PlanActionRow.plan_id == plan_id)
     return list(session.scalars(wanted.order_by(PlanActionRow.position)))
 
 
 def note_of(plan: PlanRow, caller: Caller, name: str | None, freeze_until: datetime) -> Json:
-    """Return what a job keeps of the replan that it works on: the draft's id among it."""
+    """Return what a replan's job must remember, including the id of the draft."""
     return {
         "replan_of": plan.id,
         "plan_id": new_id(),
@@ -73,7 +73,7 @@ def is_replan(change: Json | None) -> bool:
 
 
 def adopt(session: Session, job: JobRow, timeline: TimelineOut) -> None:
-    """Store the plan that a replan's job has found as a draft."""
+    """Store the plan found by a replan's job as a draft."""
     change: dict[str, Any] = job.change or {}
     parent = session.get_one(PlanRow, change["replan_of"])
     caller = Caller(owner=job.tenant, scope=Scope.SUBMIT, key_name=change["key_name"])

@@ -1,4 +1,4 @@
-"""Plans in the database: taken from jobs, moved from state to state, and reported on."""
+"""Plans in the database: made from jobs, moved from state to state, and reported on."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def add(
     session: Session, caller: Caller, owner: str, job_id: str, name: str | None,
     timeline: TimelineOut, parent_id: str | None = None, plan_id: str | None = None,
 ) -> PlanRow:  # fmt: skip
-    """Store a job's plan as a draft: its actions as rows."""
+    """Store a job's plan as a draft, with its actions as rows."""
     plan = PlanRow(
         id=plan_id or new_id(), owner=owner, name=name, job_id=job_id, parent_id=parent_id,
         state="draft",
@@ -79,7 +79,7 @@ def note(
     reason: str | None = None, effective_from: datetime | None = None,
     waivers: Sequence[WaiverIn] = (),
 ) -> None:  # fmt: skip
-    """Write a transition into the plan's history."""
+    """Record a transition in the plan's history."""
     session.add(
         PlanEventRow(
             id=new_id(), plan_id=plan.id, at=now(session), from_state=from_state,
@@ -110,9 +110,9 @@ def matching(
     *, owner: str | None, state: PlanState | None, satellite_id: str | None, job_id: str | None,
     parent_id: str | None, at: datetime | None,
 ) -> sa.Select[PlanRow]:  # fmt: skip
-    """Return the query of plans by what they are and when they are in force.
+    """Return the query of plans by their properties and the instant at which they are in force.
 
-    With an instant, `published` means what was or will be in force then, by what is known now.
+    Given an instant, `published` means in force at that instant, as far as is known now.
     """
     own = with_values(PlanRow, owner=owner, job_id=job_id, parent_id=parent_id)
     query = sa.select(PlanRow).where(*own)
@@ -134,15 +134,15 @@ def matching(
 
 
 def lock_publishing(session: Session, owner: str) -> None:
-    """Let nobody else publish for this owner until the transaction ends."""
+    """Prevent others from publishing for this owner until the transaction ends."""
     inserted(session, PublisherRow, owner=owner)
     session.execute(sa.select(PublisherRow).where(PublisherRow.owner == owner).with_for_update())
 
 
 def in_force(session: Session, plan: PlanRow, effective_from: datetime) -> list[PlanSatelliteRow]:
-    """Return where other plans of the owner are in force for this plan's satellites, from then on.
+    """Return rows of other plans in force for this plan's satellites from an instant on.
 
-    Only as far as the plan's own horizon reaches.
+    Only plans of the same owner that begin before this plan's horizon ends.
     """
     own = sa.select(PlanSatelliteRow.satellite_id).where(PlanSatelliteRow.plan_id == plan.id)
     ends = PlanSatelliteRow.in_force_until
@@ -166,7 +166,7 @@ def in_force(session: Session, plan: PlanRow, effective_from: datetime) -> list[
 def actions(
     session: Session, plan_id: str, after: int, limit: int, satellite_id: str | None
 ) -> list[tuple[PlanActionRow, str | None]]:
-    """Return a page of a plan's actions, each with the last outcome that was reported."""
+    """Return a page of a plan's actions, each with its last reported outcome."""
     wanted = sa.select(PlanActionRow).where(
         PlanActionRow.plan_id == plan_id, PlanActionRow.position > after
     )
@@ -186,7 +186,7 @@ def actions(
 
 
 def unknown_actions(session: Session, plan_id: str, action_ids: Sequence[str]) -> set[str]:
-    """Return which of these ids no action of the plan has."""
+    """Return the given ids that no action of the plan has."""
     wanted = sa.select(PlanActionRow.action_id).where(PlanActionRow.plan_id == plan_id)
     return set(action_ids) - set(session.scalars(wanted))
 
@@ -194,7 +194,7 @@ def unknown_actions(session: Session, plan_id: str, action_ids: Sequence[str]) -
 def report(
     session: Session, caller: Caller, plan_id: str, reports: Sequence[ExecutionIn]
 ) -> list[ExecutionRow]:
-    """Take down what became of some actions."""
+    """Store the reported outcomes of some actions."""
     told = (each.model_dump() for each in reports)
     return _take_down(session, caller, plan_id, ExecutionRow, told)
 
@@ -202,7 +202,7 @@ def report(
 def report_states(
     session: Session, caller: Caller, plan_id: str, states: Sequence[StateIn]
 ) -> list[PlanStateRow]:
-    """Take down telemetry."""
+    """Store telemetry."""
     told = (
         {"satellite_id": each.satellite_id, "at": each.at, "body": dumped(each)} for each in states
     )
@@ -226,7 +226,7 @@ def states(plan_id: str) -> sa.Select[PlanStateRow]:
 
 
 def last_states(session: Session, plan_id: str, until: datetime) -> dict[str, StateIn]:
-    """Return the newest state of each satellite until an instant; of equal ones the last sent."""
+    """Return each satellite's newest state up to an instant; of equally new ones, the last sent."""
     wanted = states(plan_id).where(PlanStateRow.at <= until)
     found: dict[str, StateIn] = {}
     for row in session.scalars(wanted.order_by(PlanStateRow.at, PlanStateRow.id)):
@@ -235,12 +235,12 @@ def last_states(session: Session, plan_id: str, until: datetime) -> dict[str, St
 
 
 def last_reports(session: Session, plan_id: str) -> dict[str, ExecutionRow]:
-    """Return what was reported last of each action."""
+    """Return the last report on each action."""
     return {
         row.action_id: row for row in session.scalars(executions(plan_id).order_by(ExecutionRow.id))
     }
 
 
 def executions(plan_id: str) -> sa.Select[ExecutionRow]:
-    """Return the query of all that was reported of a plan."""
+    """Return the query of all reports on actions of a plan."""
     return sa.select(ExecutionRow).where(ExecutionRow.plan_id == plan_id)

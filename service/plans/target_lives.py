@@ -1,6 +1,6 @@
-"""How far the targets of a catalogue have come, read from plans and what was reported of them.
+"""The progress of a catalogue's targets, derived from plans and reports on them.
 
-Nothing of it is stored: a report that comes late, or a plan that is withdrawn, changes it at once.
+Nothing of it is stored, so a late report or a plan's withdrawal takes effect at once.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ _ROUNDING: Final = timedelta(milliseconds=2)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lives:
-    """What plans and reports say of the targets of one catalogue, by target id.
+    """What plans and reports say about the targets of one catalogue, by target id.
 
     Attributes
     ----------
     taken
-        The first image of each target that was taken.
+        The first image taken of each target.
     delivered
-        The targets with an image that is on the ground.
+        The targets with an image on the ground.
     planned
-        The next image in a published plan of each target.
+        The next image of each target in a published plan.
     """
 
     taken: Mapping[str, TargetCollectOut] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Lives:
     def state_of(
         self, target_id: str, due: datetime | None, *, is_cancelled: bool, now: datetime
     ) -> TargetState:
-        """Return how far a target has come; an image counts for more than what follows it."""
+        """Return the state of a target; an image counts even if the target was cancelled later."""
         if target_id in self.delivered:
             return "delivered"
         if target_id in self.taken:
@@ -64,14 +64,14 @@ class Lives:
         return "expired" if due is not None and due <= now else "open"
 
     def collect_of(self, target_id: str) -> TargetCollectOut | None:
-        """Return the image that the state rests on."""
+        """Return the image on which the state is based."""
         return self.taken.get(target_id) or self.planned.get(target_id)
 
 
 def plans_by_catalog(session: Session, owner: str | None) -> dict[str, list[str]]:
-    """Return the plans that ever were published, by the catalogues that they serve.
+    """Return the plans that were ever published, by the catalogues of their targets.
 
-    Ids of targets are unique in a scenario, so that a plan and an id say which target it is.
+    Target ids are unique within a scenario, so that a plan and an id identify a target.
     """
     catalogs = ScenarioRow.summary["target_catalog_ids"]
     wanted = (
@@ -94,7 +94,7 @@ def plans_by_catalog(session: Session, owner: str | None) -> dict[str, list[str]
 
 
 def lives_of(session: Session, plan_ids: Iterable[str]) -> Lives:
-    """Return what these plans, and the reports of them, say of their targets."""
+    """Return what these plans, and the reports on them, say about their targets."""
     ids = list(plan_ids)
     if not ids:
         return Lives()
@@ -107,7 +107,7 @@ def lives_of(session: Session, plan_ids: Iterable[str]) -> Lives:
 
 
 def _last_outcome(action: type[PlanActionRow]) -> sa.ScalarSelect[str]:
-    """Return the query of what was reported last of an action."""
+    """Return the query of the last reported outcome of an action."""
     return (
         sa.select(ExecutionRow.outcome)
         .where(ExecutionRow.plan_id == action.plan_id, ExecutionRow.action_id == action.action_id)
@@ -138,7 +138,7 @@ def _base(plan_ids: list[str]) -> _Found:
 
 
 def _taken(plan_ids: list[str]) -> _Found:
-    # Of most actions nothing was reported: those that have a report are asked for first.
+    # Most actions have no report, so those with one are selected first.
     reported = sa.exists().where(
         ExecutionRow.plan_id == PlanActionRow.plan_id,
         ExecutionRow.action_id == PlanActionRow.action_id,
@@ -147,7 +147,7 @@ def _taken(plan_ids: list[str]) -> _Found:
 
 
 def _planned(plan_ids: list[str]) -> _Found:
-    """Return the query of what published plans have in the spans in which they are in force."""
+    """Return the query of collects in published plans, in the spans in which these are in force."""
     ends = PlanSatelliteRow.in_force_until
     return (
         _base(plan_ids)
@@ -173,10 +173,10 @@ def _first(session: Session, wanted: _Found) -> dict[str, TargetCollectOut]:
 def _delivered(
     session: Session, plan_ids: list[str], taken: Mapping[str, TargetCollectOut]
 ) -> frozenset[str]:
-    """Return the targets whose image came down in a contact that was reported as executed.
+    """Return the targets whose image was downlinked in a contact reported as executed.
 
-    A replan repeats what is frozen: an image may have been reported on one plan, and come down by
-    another one.
+    A replan repeats frozen actions, so an image may be reported on one plan and downlinked in
+    another.
     """
     contact, collect = aliased(PlanActionRow), aliased(PlanActionRow)
     spans: dict[str, list[tuple[datetime, datetime]]] = defaultdict(list)

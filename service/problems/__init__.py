@@ -1,1 +1,1 @@
-"""What can be wrong with a request: each kind of problem, and where its cause stands."""
+"""What can be wrong with a request: the kinds of problems, and the location of each cause."""

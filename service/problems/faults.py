@@ -1,4 +1,4 @@
-"""What is wrong with a body or a file, as problems: from pydantic's findings to JSON pointers."""
+"""Faults of a body or a file as problems: from pydantic's errors to JSON pointers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
-    """Return the error for a body with these faults; its code is theirs where they agree."""
+    """Return the error for a body with these faults, with their code if they share one."""
     codes = {fault.code for fault in faults}
     common = codes.pop() if len(codes) == 1 else "invalid_request"
     first = faults[0]
@@ -28,18 +28,18 @@ def refuse(faults: Sequence[Fault], *, code: str | None = None) -> ServiceError:
 def refuse_one(
     code: str, detail: str, pointer: str | None = None, *, row: int | None = None
 ) -> ServiceError:
-    """Return the error for a body in which one thing is wrong."""
+    """Return the error for a body with one fault."""
     return refuse([Fault(code=code, detail=detail, pointer=pointer, row=row)])
 
 
 def require_none(faults: Sequence[Fault]) -> None:
-    """Refuse a body in which anything is wrong."""
+    """Refuse a body that has faults."""
     if faults:
         raise refuse(faults)
 
 
 def validated(shape: type[M], values: object) -> M:
-    """Return a document of this shape; 422 with every fault where it is none."""
+    """Return a document of this shape; 422 with all faults if it does not fit."""
     try:
         return shape.model_validate(values)
     except ValidationError as error:
@@ -47,7 +47,7 @@ def validated(shape: type[M], values: object) -> M:
 
 
 def pointer_to(*steps: str | int) -> str:
-    """Return the JSON pointer of these steps.
+    """Return the JSON pointer with these steps.
 
     >>> pointer_to("rewards", "a/b"), pointer_to()
     ('/rewards/a~1b', '')
@@ -56,7 +56,7 @@ def pointer_to(*steps: str | int) -> str:
 
 
 def faults_of(errors: Iterable[Any], body: object) -> list[Fault]:
-    """Return what pydantic found, with JSON pointers into ``body``."""
+    """Return pydantic's errors as faults, with JSON pointers into ``body``."""
     return [
         Fault(
             code=_CODES.get(e["type"], "invalid_value"),
@@ -104,9 +104,9 @@ def _sentence(error: Mapping[str, Any]) -> str:
 
 
 def _pointer(loc: Sequence[str | int], body: object) -> str | None:
-    # A pydantic location also names the branches of unions, which are no places in the
-    # document: only the parts that lead somewhere in the body are kept, and the last one,
-    # which may be a field that is missing.
+    # A pydantic location also names branches of unions, which do not exist in the document.
+    # Only the parts that lead somewhere in the body are kept, and the last one, which may be
+    # a missing field.
     if loc[0] != "body":
         return None
     parts: list[str | int] = []

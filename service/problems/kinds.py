@@ -1,4 +1,4 @@
-"""Every kind of problem the service answers with: status, title, and what to do about it."""
+"""Every kind of problem in the service's answers: status, title, and what to do about it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner_core.errors import Fault
 
 @dataclass(frozen=True, slots=True)
 class ProblemKind:
-    """A row of the table that ``GET /problems/{code}`` explains."""
+    """A row of the table behind ``GET /problems/{code}``."""
 
     status: int
     title: str
@@ -25,11 +25,11 @@ class ServiceError(Exception):
     Parameters
     ----------
     code
-        A key of ``KINDS``; gives the status.
+        A key of ``KINDS``, which gives the status.
     detail
         One sentence for people.
     faults
-        Places in the body or file, where there are any.
+        Locations in the body or file, if there are any.
     headers
         Extra response headers, such as ``Retry-After``.
     """
@@ -58,7 +58,7 @@ def _table() -> dict[str, ProblemKind]:
 
 
 KINDS: Final = _table()
-"""All codes. `kind_of` also serves one that is missing here: as data that is wrong, 422."""
+"""All known codes. For any other code, `kind_of` returns wrong data, 422."""
 
 
 def kind_of(code: str) -> ProblemKind:

@@ -1,1 +1,1 @@
-"""What every process of the service has: logs, traces, and a way to end."""
+"""What all processes of the service share: logs, traces, and a way to end."""

@@ -1,7 +1,7 @@
-"""Connections that cost little: time limits, and places that the idle give up.
+"""Inexpensive connections: time limits, and slots that idle connections give up.
 
-uvicorn waits for ever for the rest of a request's head, and its limit of connections refuses
-health checks like all else.
+uvicorn waits for ever for the rest of a request's head, and its connection limit also
+refuses health checks.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from typing import Any, ClassVar, Final
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 HEAD_WITHIN_S: Final = 10.0
-"""From the connection, or the answer before, to the last byte of a request's head."""
+"""From the connection, or the last answer, to the last byte of a request's head."""
 LONGEST_HEAD: Final = 65_536
 
 _MOST: Final = 1000
 _SPARE_FILES: Final = 256
-"""For databases, logs, and connections that are being closed."""
+"""File descriptors for databases, logs, and connections that are being closed."""
 
 
 class Protocol(HttpToolsProtocol):
-    """Closes connections that ask for nothing, and some of those where there are too many.
+    """Closes connections that do not ask, and some of them if there are too many.
 
-    Those that never asked for anything go first, then those that were answered the longest ago:
-    a client that comes back finds its own open.
+    Those that never asked go first, then those whose last answer is the oldest, so that a
+    returning client finds its connection open.
 
-    A connection *asks* from the end of a request's head until its answer is sent. One that
-    does not, or sends a body that nobody has let in yet, gives its place to a new one.
+    A connection *asks* from the end of a request's head until its answer is sent. One that does
+    not ask, or sends a body that has not been admitted yet, gives its slot to a new connection.
     """
 
     most: ClassVar[int] = _MOST
@@ -43,7 +43,7 @@ class Protocol(HttpToolsProtocol):
         self._is_answered = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a place, that of the oldest idle connection where there is none."""
+        """Take a slot; if there is none, that of the oldest idle connection."""
         super().connection_made(transport)
         self._places[self] = None
         if len(self._places) > self.most:
@@ -51,13 +51,13 @@ class Protocol(HttpToolsProtocol):
         self._await_head()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Give the place back."""
+        """Give the slot back."""
         self._places.pop(self, None)
         self._stop_timer()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes; a head of too many is none."""
+        """Take bytes; close the connection if a head is too long."""
         if self._is_head:
             if self._head_bytes > LONGEST_HEAD:
                 self.transport.close()
@@ -78,7 +78,7 @@ class Protocol(HttpToolsProtocol):
         super().on_headers_complete()
 
     def on_response_complete(self) -> None:
-        """Wait for the next request, or for what is left of this one's body."""
+        """Wait for the next request, or for the rest of this one's body."""
         is_next_here = bool(self.pipeline)
         self._is_answered = True
         if self in self._places:
@@ -107,7 +107,7 @@ class Protocol(HttpToolsProtocol):
 
 
 def allow_connections() -> None:
-    """Let this process have as many files open as it may, and as many connections as fit."""
+    """Raise this process's limit on open files, and fit the number of connections to it."""
     if sys.platform == "win32":
         return
     import resource

@@ -1,4 +1,4 @@
-"""Importing what a process needs for as long as it runs."""
+"""Importing what a process needs for its whole life."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from contextlib import contextmanager
 
 @contextmanager
 def importing() -> Iterator[None]:
-    """Look for no garbage in what is imported meanwhile, neither then nor later: all of it stays.
+    """Exclude what is imported meanwhile from garbage collection, since all of it stays.
 
-    The search for it takes a sixth of the time in which the service is imported.
+    Collecting garbage takes a sixth of the time to import the service.
     """
     was_looking = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if was_looking:  # else whoever imports this does the same for all of it
+        if was_looking:  # otherwise an outer ``importing`` does this for everything
             gc.freeze()
             gc.enable()

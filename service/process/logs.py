@@ -1,4 +1,4 @@
-"""Structured logs: one JSON object a line, with the request it belongs to."""
+"""Structured logs: one JSON object per line, with the request it belongs to."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _trace_id() -> str | None:
 
 @contextmanager
 def about_job(job: str, request: str | None) -> Iterator[None]:
-    """Name a job, and the request that it came with, in each line of this thread."""
+    """Name a job, and the request that submitted it, in each log line of this thread."""
     tokens = job_id.set(job), request_id.set(request)
     try:
         yield
@@ -41,7 +41,7 @@ def about_job(job: str, request: str | None) -> Iterator[None]:
 
 
 class JsonFormatter(logging.Formatter):
-    """Write a record with its ``extra`` fields as one line of JSON, keys masked."""
+    """Writes a record with its ``extra`` fields as one line of JSON, with API keys masked."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""
@@ -67,5 +67,5 @@ def configure_logging() -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonFormatter())
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
-    # Each call of its own that the service makes would be a line.
+    # Otherwise each HTTP call that the service makes would be a line.
     logging.getLogger("httpx").setLevel(logging.WARNING)

@@ -1,4 +1,4 @@
-"""A process's name, what it holds, and its end with its parent's."""
+"""A process's name, its memory, and its end when its parent ends."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PR_SET_NAME: Final = 15
 
 
 def die_with_parent(number: signal.Signals) -> None:
-    """Ask for this signal when the parent ends, at once if it has; only Linux can do it."""
+    """Request this signal for when the parent ends, or at once if it has; only on Linux."""
     if sys.platform != "linux":
         return
     parent = os.getppid()
@@ -25,7 +25,7 @@ def die_with_parent(number: signal.Signals) -> None:
 
 
 def held_mb(pid: int | None) -> float:
-    """Return the memory that a process holds; 0 where it has ended."""
+    """Return the resident memory of a process; 0 if it has ended."""
     try:
         return float(psutil.Process(pid).memory_info().rss) / 1e6
     except psutil.NoSuchProcess:
@@ -33,9 +33,9 @@ def held_mb(pid: int | None) -> float:
 
 
 def name_this_process(name: str) -> None:
-    """Set the name that ``ps -o comm`` and ``top`` show, of at most 15 bytes; only on Linux.
+    """Set the name shown by ``ps -o comm`` and ``top``, at most 15 bytes; only on Linux.
 
-    A forked process has the command line of the one that it was forked from.
+    A forked process keeps the command line of the process it was forked from.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode())

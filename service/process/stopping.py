@@ -1,4 +1,4 @@
-"""The wish to stop, as signal handlers may express it."""
+"""A request to stop, which signal handlers may make."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from queue import Empty, SimpleQueue
 
 
 class StopRequest:
-    """A switch that is thrown once; safe in a signal handler, unlike ``threading.Event``.
+    """A switch that is set once; safe in a signal handler, unlike ``threading.Event``.
 
-    A signal may come while this very thread holds an event's lock: setting the event in the
-    handler would then wait for ever. Putting into a ``SimpleQueue`` never does.
+    A signal may arrive while its thread holds an event's lock; setting the event in the handler
+    would then wait for ever. Putting into a ``SimpleQueue`` never does.
     """
 
     def __init__(self) -> None:
         self._asked: SimpleQueue[None] = SimpleQueue()
 
     def ask(self) -> None:
-        """Throw the switch."""
+        """Set the switch."""
         self._asked.put(None)
 
     def is_asked(self) -> bool:
-        """Return whether it has been thrown."""
+        """Return whether it has been set."""
         return not self._asked.empty()
 
     def wait(self, time_s: float) -> bool:
-        """Wait until it is thrown, for so long at most; return whether it has been."""
+        """Wait until it is set, but at most this long; return whether it has been."""
         try:
             self._asked.get(timeout=time_s)
         except Empty:

@@ -1,6 +1,6 @@
-"""Traces (OpenTelemetry): from the request that sends a job, over its row, to what its worker does.
+"""Traces (OpenTelemetry): from the request that submits a job, via its row, to its worker.
 
-Off unless asked for: OpenTelemetry's interface, which the web framework brings along, then does
+Off by default: OpenTelemetry's interface, a dependency of the web framework, then does
 nothing, and its implementation (the extra ``otel``) is not even loaded.
 """
 
@@ -31,11 +31,11 @@ _propagator: Final = TraceContextTextMapPropagator()
 
 
 class CannotTrace(Exception):
-    """Traces are asked for and not possible; the message says what to do."""
+    """Traces are requested but not possible; the message says what to do."""
 
 
 def is_asked_for(settings: Settings) -> bool:
-    """Return whether traces shall be sent: by the setting, else where a collector is named."""
+    """Return whether to send traces: as set, otherwise if a collector is configured."""
     if settings.otel is not None:
         return settings.otel
     if os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
@@ -44,22 +44,22 @@ def is_asked_for(settings: Settings) -> bool:
 
 
 def start_tracing(settings: Settings, role: str) -> TracerProvider | None:
-    """Send this process's spans as the standard ``OTEL_`` variables say, if that is asked for.
+    """Send this process's spans according to the standard ``OTEL_`` variables, if requested.
 
     Parameters
     ----------
     role
-        What the process does: its service's name is ``slewline-<role>`` unless
+        The role of the process: its service name is ``slewline-<role>`` unless
         ``OTEL_SERVICE_NAME`` gives another.
 
     Returns
     -------
-    What must be shut down before the process ends, or None where nothing is sent.
+    What must be shut down before the process ends, or None if nothing is sent.
 
     Raises
     ------
     CannotTrace
-        Where the extra ``otel`` is not installed.
+        If the extra ``otel`` is not installed.
     """
     if not is_asked_for(settings):
         return None
@@ -82,12 +82,12 @@ def start_tracing(settings: Settings, role: str) -> TracerProvider | None:
 
 
 def is_untraced(scope: MutableMapping[str, Any]) -> bool:
-    """Return whether a request is one of those that only ask whether we are well."""
+    """Return whether a request only checks health or reads metrics."""
     return scope["type"] == "http" and str(scope["path"]).startswith(_UNTRACED)
 
 
 def note_queued(job_id: str) -> str | None:
-    """Trace that a job is queued; return what its row must keep for ``running``, or None."""
+    """Trace the queueing of a job; return what its row must keep for ``running``, or None."""
     attributes = {"slewline.job_id": job_id}
     if (request := request_id.get()) is not None:
         attributes["slewline.request_id"] = request
@@ -99,7 +99,7 @@ def note_queued(job_id: str) -> str | None:
 
 @contextmanager
 def running(traceparent: str | None, **attributes: str | int) -> Iterator[JobSpan]:
-    """Trace the run of a job as part of the trace that it was queued in."""
+    """Trace the run of a job as part of the trace in which it was queued."""
     parent = None if traceparent is None else _propagator.extract({"traceparent": traceparent})
     with _tracer.start_as_current_span(
         "run job",
@@ -115,7 +115,7 @@ def running(traceparent: str | None, **attributes: str | int) -> Iterator[JobSpa
 
 
 class JobSpan:
-    """The span of a run, with one within it for each phase, as the solver's process tells them."""
+    """The span of a run, with a child span for each phase reported by the solver's process."""
 
     def __init__(self, span: Span):
         self._span = span
@@ -133,7 +133,7 @@ class JobSpan:
             self._phase = None
 
     def note_end(self, state: str, *, failed: bool = False) -> None:
-        """Tell how the run ended."""
+        """Record how the run ended."""
         self._span.set_attribute("slewline.state", state)
         if failed:
             self._span.set_status(Status(StatusCode.ERROR))

@@ -1,1 +1,1 @@
-"""Scenarios as files and requests have them: read, checked, changed and translated for the core."""
+"""Scenarios in files and requests: read, checked, changed, and translated for the core."""

@@ -1,4 +1,4 @@
-"""Work that is too heavy for a request: done once, one at a time, beside the requests."""
+"""Work too heavy for a request: done once, in the background, one piece at a time."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _MOST_WAITING: Final = 32
 
 
 class Background:
-    """One thread that works off what requests ask for, and keeps the last answers.
+    """One thread that does the work that requests ask for, and keeps the latest answers.
 
     A request waits for a while and is then told to ask again; the work goes on.
 
-    A subclass says with ``_kept`` how many answers are kept at hand, and with ``_told`` what a
-    request is told that has to come back.
+    A subclass sets ``_kept``, the number of answers to keep, and ``_told``, the message to a
+    request that must come back.
     """
 
     _kept: int
@@ -38,12 +38,12 @@ class Background:
         self._known: OrderedDict[str, Future[Any]] = OrderedDict()
 
     def work_out(self, key: str, work: Callable[[Budget], T]) -> T:
-        """Return what the work of this key gives; 503 ``still_computing`` where that takes long.
+        """Return the result of the work for this key; 503 ``still_computing`` if it takes long.
 
         Parameters
         ----------
         key
-            Names the answer, which must always be the same.
+            Identifies the result, which must always be the same.
         """
         future = self._future(key, work)
         try:

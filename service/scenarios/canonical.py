@@ -1,7 +1,7 @@
-"""The canonical form of a scenario file, whose SHA-256 identifies the question.
+"""The canonical form of a scenario file, whose SHA-256 identifies the scenario.
 
-It has every default filled in, instants in UTC with milliseconds, keys sorted and no name. Fields
-that are younger than the first release are left out where they say what held without them.
+It has all defaults filled in, instants in UTC with milliseconds, sorted keys and no name. A field
+added after the first release is left out if its value means the same as its absence.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def canonical(content: Mapping[str, Any]) -> str:
     Raises
     ------
     InvalidScenario, InvalidElements
-        Where the file is not of its schema, or an orbit cannot be read.
+        If the file does not fit the schema, or an orbit cannot be read.
     """
     return canonical_of_file(read_file(content))
 
@@ -42,12 +42,12 @@ def sha256_of(canonical_text: str) -> str:
 
 
 def canonical_of_file(file: ScenarioFile) -> str:
-    """Return the canonical form of a file that `read_file` has made."""
+    """Return the canonical form of a file returned by `read_file`."""
     document = file.model_dump(mode="json", exclude={"name", "release"})
     for satellite in document["satellites"]:
         _without_unset(satellite, "tle", "omm", "oem")
         if satellite["spacecraft"] not in (None, "paper", "paper_code"):
-            continue  # what it leaves out would be its type's
+            continue  # what is left out would be taken from its type
         del satellite["spacecraft"]
         _without_unset(satellite["sensor"], "sensor_type", "sun_exclusion_deg")
         _without_unset(satellite["agility"], "sun_exclusion_deg")
@@ -76,7 +76,7 @@ def canonical_of_file(file: ScenarioFile) -> str:
 
 
 def _plain_replan(replan: dict[str, Any]) -> None:
-    """Leave out what younger releases may say of a plan to go on from."""
+    """Leave out fields of a replan that are unset or younger and at their default."""
     for action in replan["base"]:
         _without_unset(action, *tuple(action))
     for promise in replan["promises"]:
@@ -89,7 +89,7 @@ def _plain_replan(replan: dict[str, Any]) -> None:
 
 
 def _plain_state(state: dict[str, Any]) -> None:
-    """Leave out of a state what it does not say."""
+    """Leave unset fields out of a state."""
     _without_unset(state, "battery_fraction", "recorder_fraction", "attitude", "on_board")
     for image in state.get("on_board", ()):
         _without_unset(image, "mbit", "recorder_fraction", "worth")
@@ -98,7 +98,7 @@ def _plain_state(state: dict[str, Any]) -> None:
 
 
 def _plain_objective(document: dict[str, Any]) -> None:
-    """Leave out of the objective what it means without being said."""
+    """Leave defaults out of the objective."""
     objective = document["objective"]
     if not objective["prefer"]:
         del objective["prefer"]
@@ -109,19 +109,19 @@ def _plain_objective(document: dict[str, Any]) -> None:
 
 
 def _counts_delivery(objective: Mapping[str, Any]) -> bool:
-    """Whether images earn less than all when they are taken; a half-life is of what is left."""
+    """Whether images earn less than all when taken; only then does a half-life matter."""
     return bool(objective["collected_share"] < 1.0)
 
 
 def _without_unset(part: dict[str, Any], *names: str) -> None:
-    """Leave out fields that are null: questions older than the field keep their hash."""
+    """Leave out fields that are null, so that scenarios older than a field keep their hash."""
     for name in names:
         if part[name] is None:
             del part[name]
 
 
 def _without(part: dict[str, Any], **plain: object) -> None:
-    """Leave out fields at these values, which questions older than the field had without it."""
+    """Leave out fields at these values, which scenarios older than the fields imply."""
     for name, value in plain.items():
         if part.get(name) == value:
             del part[name]

@@ -1,4 +1,4 @@
-"""Faults of a changed scenario, told where their cause stands in the change that was sent."""
+"""Faults of a changed scenario, located in the change that caused them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from service.wire.pins import PinnedActionIn
 _PIN = re.compile(r"/pins/(keep|skip)/(\d+)")
 
 
-Sites = Mapping[str, Sequence[str | None]]
-"""Where each pin of the changed scenario comes from; None for one of the scenario before."""
+Places = Mapping[str, Sequence[str | None]]
+"""Where each pin of the changed scenario comes from; None for a pin of the old scenario."""
 
 
 def places_of(
     pins: Pins, forbid: Sequence[PinnedAction], force: Sequence[PinnedAction], num_dropped: int
-) -> Sites:
-    """Return those of ``reasons.what_if``: the new ones follow those there were."""
+) -> Places:
+    """Return the places of ``reasons.what_if``'s pins: new ones follow the old ones."""
     skipped = [f"/forbid/{i}" for i, one in enumerate(forbid) if not is_any_image(one)]
     dropped = [f"/relax/drop_actions/{i}" for i in range(num_dropped)]
     return {
@@ -32,8 +32,8 @@ def places_of(
     }
 
 
-def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Sites:
-    """Return those of all that the body itself names."""
+def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]) -> Places:
+    """Return the places of all pins in the body itself."""
     return {
         "keep": [f"/force/{i}" for i in range(len(force))],
         "skip": [f"/forbid/{i}" for i in range(len(forbid))],
@@ -41,8 +41,8 @@ def places_of_body(force: Sequence[PinnedAction], forbid: Sequence[PinnedAction]
 
 
 @contextmanager
-def pointing_into(change: ChangeIn, places: Sites) -> Iterator[None]:
-    """Let faults of pins point into the change."""
+def pointing_into(change: ChangeIn, places: Places) -> Iterator[None]:
+    """Make faults of pins point into the change."""
 
     def place(pin: re.Match[str]) -> str | None:
         return places[pin[1]][int(pin[2])]
@@ -65,13 +65,13 @@ def pointing_into(change: ChangeIn, places: Sites) -> Iterator[None]:
 
 
 def place_in_relax(fault: Fault) -> str:
-    """Return where a fault of a relaxed file stands in ``relax``."""
+    """Return where in ``relax`` a fault of a relaxed file comes from."""
     of_horizon = (fault.pointer or "").startswith("/horizon")
     return "/relax/horizon_end" if of_horizon else "/relax"
 
 
 def _is_object(change: ChangeIn, pointer: str) -> bool:
-    """Return whether an action is written out there, and not named by an id alone."""
+    """Return whether the action there is an object, rather than only an id."""
     _, name, number = pointer.split("/")[:3]
     actions = {"force": change.force, "forbid": change.forbid}.get(name)
     return actions is not None and isinstance(actions[int(number)], PinnedActionIn)

@@ -1,4 +1,4 @@
-"""Clear skies of a scenario file, checked and made ready for the planner."""
+"""The forecast in a scenario file, checked and prepared for the planner."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from service.wire.scenarios import HorizonIn, ScenarioFile, SkySeriesIn
 
 
 def forecast_from(file: ScenarioFile) -> Forecast | None:
-    """Return the clear skies of a file.
+    """Return the forecast of clear skies in a file.
 
     Raises
     ------

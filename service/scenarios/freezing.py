@@ -1,4 +1,4 @@
-"""Freezing scenarios: ids looked up, content made canonical, stored once."""
+"""Freezing scenarios: ids resolved, content made canonical, stored once."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ R = TypeVar("R", SatelliteRow, TargetCatalogRow, GroundStationRow)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrozenScenario:
-    """A question that can be stored.
+    """A scenario that can be stored.
 
     Attributes
     ----------
@@ -65,12 +65,12 @@ class FrozenScenario:
 def freeze(
     database: Database, body: ScenarioIn, limits: ScenarioLimits, owner: str | None
 ) -> FrozenScenario:
-    """Return the frozen form of a question over what is stored. Stores nothing.
+    """Return the frozen form of a scenario made of stored things. Stores nothing.
 
     Parameters
     ----------
     owner
-        Whose forecasts it may name; None for anybody's.
+        Whose forecasts it may name; None for those of all owners.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def freeze(
         ``scenario_too_large``, ``duplicate_pin``, ``ambiguous_name``, ``unknown_forecast``,
         ``forecast_does_not_cover``; with a pointer into the body.
     PropagationFailed
-        SGP4 cannot carry a satellite through the horizon.
+        If SGP4 cannot propagate a satellite through the horizon.
     """
     with database.reading() as session:
         number = num_targets(session, body.target_catalog_ids)
@@ -96,7 +96,7 @@ def freeze(
 
 
 def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
-    """Return the frozen form of a file that `translate.read_file` has made; errors as above."""
+    """Return the frozen form of a file returned by `translate.read_file`; errors as above."""
     scenario = checked_scenario(file, limits)
     content = canonical_of_file(file)
     return FrozenScenario(
@@ -108,7 +108,7 @@ def freeze_file(file: ScenarioFile, limits: ScenarioLimits) -> FrozenScenario:
 
 
 def checked_scenario(file: ScenarioFile, limits: ScenarioLimits) -> Scenario:
-    """Return the scenario of a file that is not too large, and whose elements carry so far."""
+    """Return a file's scenario, checking its size and that its elements cover the horizon."""
     limits.check(horizon_from(file.horizon), len(file.satellites), len(file.targets))
     scenario = scenario_from_file(file)
     check_propagation(scenario)
@@ -119,17 +119,17 @@ def checked_scenario(file: ScenarioFile, limits: ScenarioLimits) -> Scenario:
 def save(
     session: Session, frozen: FrozenScenario, owner: str | None = None
 ) -> tuple[ScenarioRow, bool]:
-    """Return the stored scenario of this content, and whether it is new.
+    """Return the stored scenario with this content, and whether it is new.
 
     Parameters
     ----------
     owner
-        Whose it stays, as long as nobody stores the same for all; None to store it for all.
+        Who alone sees it, unless the same is stored for all; None to store it for all.
     """
     same = sa.select(ScenarioRow).where(ScenarioRow.sha256 == frozen.sha256)
     stored = session.scalar(same)
     if stored is None:
-        # Somebody else may store the same content at this moment; then both get that one.
+        # Another request may store the same content just now; then both get that row.
         is_new = inserted(
             session,
             ScenarioRow,
@@ -149,19 +149,19 @@ def save(
     if owner is not None:
         store.let_see_too(session, stored.id, owner)
         return stored, False
-    # Who stores for all what somebody has for himself is not told of that.
+    # A caller who stores for all is not told that somebody already had it privately.
     return stored, store.disown(session, stored.id)
 
 
 def _in_ids(fault: Fault) -> str:
-    """Return the place in lists of ids, where the file would hold the things themselves."""
+    """Return the location in a list of ids, for a fault in the file made from it."""
     if fault.code == "forecast_does_not_cover":
         return "/forecast_id"
     return re.sub(r"^/satellites/(\d+).*", r"/satellite_ids/\1", fault.pointer or "")
 
 
 def num_targets(session: Session, catalog_ids: Sequence[str]) -> int:
-    """Return how many targets catalogues hold, without reading them."""
+    """Return how many targets the catalogues hold, without reading them."""
     total = sa.func.coalesce(sa.func.sum(TargetCatalogRow.num_targets), 0)
     wanted = sa.select(total).where(TargetCatalogRow.id.in_(set(catalog_ids)))
     return int(session.scalars(wanted).one())
@@ -183,7 +183,7 @@ def _expanded(session: Session, body: ScenarioIn) -> ScenarioFile:
 
 
 def _outages(session: Session, body: ScenarioIn) -> list[PlacedOutage]:
-    """Return the question's own outages, and those stored that concern it."""
+    """Return the scenario's own outages, and the stored ones that concern it."""
     stored = outage_store.concerning(
         session, body.satellite_ids, body.ground_station_ids, body.horizon.start, body.horizon.end
     )
@@ -192,7 +192,7 @@ def _outages(session: Session, body: ScenarioIn) -> list[PlacedOutage]:
 
 
 def satellites_of(session: Session, ids: Sequence[str]) -> list[FileSatellite]:
-    """Return stored satellites, with the elements in force, as a scenario file holds them."""
+    """Return stored satellites with their current elements, as in a scenario file."""
     rows = _find(session, SatelliteRow, "satellite", ids)
     elements = satellite_store.in_force(session, ids)
     return [
@@ -230,7 +230,7 @@ def _targets(session: Session, catalog_ids: Sequence[str]) -> list[FileTarget]:
 def targets_by_catalog(
     session: Session, catalog_ids: Sequence[str]
 ) -> list[tuple[int, FileTarget]]:
-    """Return the targets of catalogues, each with the number of its own; none may be missing."""
+    """Return the targets of catalogues, each with its catalogue's index; none may be missing."""
     _find(session, TargetCatalogRow, "target_catalog", catalog_ids)
     targets: list[tuple[int, FileTarget]] = []
     for position, catalog_id in enumerate(catalog_ids):
@@ -251,7 +251,7 @@ def _ground_stations(session: Session, ids: Sequence[str]) -> list[FileGroundSta
 
 
 def _of_today(model: type[M], body: dict[str, Any], pointer: str) -> M:
-    """Return something stored as it is planned with; its values may be of an earlier release."""
+    """Return a stored thing validated as of today; an earlier release may have stored it."""
     try:
         return model.model_validate(body)
     except ValidationError as error:
@@ -262,7 +262,7 @@ def _of_today(model: type[M], body: dict[str, Any], pointer: str) -> M:
 
 
 def _find(session: Session, table: type[R], what: str, ids: Sequence[str]) -> list[R]:
-    """Return the rows of these ids, in their order; none may be missing or named twice."""
+    """Return the rows with these ids, in order; none may be missing or named twice."""
     query = sa.select(table).where(table.id.in_(set(ids)), table.deleted_at.is_(None))
     rows = {row.id: row for row in session.scalars(query)}
     for position, own_id in enumerate(ids):

@@ -1,9 +1,9 @@
 """Stored forecasts, frozen into a scenario file.
 
-What is frozen are the series of the targets, not the grid that they come from: a forecast is
-linear in time, so a target's values at the forecast's instants say all of it. That is less than
-the target itself takes, whatever the size of the grid, and the hash is of the very numbers that
-are planned with: two forecasts that say the same of a question make the same question.
+The series of the targets are frozen, not the grid that they come from: a forecast is linear in
+time, so a target's values at the forecast's instants are all of it. That takes less room than the
+target itself, whatever the size of the grid, and the hash covers exactly the numbers used for
+planning: two forecasts with the same values for a scenario give the same scenario.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _DIGITS = 4
 
 
 def find_forecast(session: Session, forecast_id: str, owner: str | None) -> ForecastRow:
-    """Return a forecast of an owner's, its block too; ``unknown_forecast`` where there is none."""
+    """Return an owner's forecast with its block; ``unknown_forecast`` if there is none."""
     row = find_own(session, ForecastRow, forecast_id, owner)
     if row is None:
         raise InvalidScenario(
@@ -31,7 +31,7 @@ def find_forecast(session: Session, forecast_id: str, owner: str | None) -> Fore
 
 
 def frozen_forecast(row: ForecastRow, file: ScenarioFile) -> FileForecast:
-    """Return what a stored forecast says of a file's targets, over its horizon."""
+    """Return a stored forecast's values for a file's targets, over its horizon."""
     targets = file.targets
     skies = from_bytes(row.block).over(
         [target.id for target in targets],

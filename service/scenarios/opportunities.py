@@ -1,4 +1,4 @@
-"""Opportunities for readers: computed once per scenario, stored, and kept at hand.
+"""Opportunities for readers: computed once per scenario, stored, and kept in memory.
 
 Jobs store the same block, so that whoever comes first computes it for all.
 """
@@ -27,15 +27,15 @@ class Described:
 
 
 class OpportunityReader(Background):
-    """Reads or computes opportunities, one scenario at a time, beside the requests.
+    """Reads or computes opportunities in the background, one scenario at a time.
 
-    Scenarios are told apart by their hash, so that what is kept never goes stale.
+    Scenarios are identified by their hash, so that what is kept never goes stale.
     """
 
     _kept, _told = 4, "The opportunities of this scenario are being computed."
 
     def get(self, database: Database, scenario_id: str, sha256: str) -> Described:
-        """Return a scenario's opportunities; 503 ``still_computing`` where that takes long."""
+        """Return a scenario's opportunities; 503 ``still_computing`` if that takes long."""
         return self.work_out(sha256, lambda budget: _read(database, scenario_id, sha256, budget))
 
 

@@ -1,4 +1,4 @@
-"""Pins, outages and states, from what clients send to the core's and back: it has the last word."""
+"""Pins, outages and states, from request bodies to the core, which makes the last checks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def attitude_from(body: AttitudeIn) -> Attitude:
 
 
 def replan_from(body: ReplanOfFile) -> Replan:
-    """Return the plan to go on from; what cannot be points into ``/replan``."""
+    """Return the plan to go on from; errors point into ``/replan``."""
     return Replan(
         base=tuple(action_from(action) for action in body.base),
         freeze_until=body.freeze_until,
@@ -73,14 +73,14 @@ def replan_from(body: ReplanOfFile) -> Replan:
 
 
 def with_settled_pins(file: ScenarioFile) -> ScenarioFile:
-    """Return the file with ids where its pins have names of satellites and stations.
+    """Return the file with ids in place of the names of satellites and stations in its pins.
 
-    Not part of what a scenario is checked for: those of earlier releases keep theirs.
+    Not part of the checks of a scenario: those of earlier releases keep their names.
 
     Raises
     ------
     InvalidScenario
-        ``ambiguous_name`` where several have the name, ``duplicate_pin`` where one pin is
+        ``ambiguous_name`` if several have the name, ``duplicate_pin`` if one pin is
         written twice.
     """
     ids = {
@@ -101,7 +101,7 @@ def with_settled_pins(file: ScenarioFile) -> ScenarioFile:
 
 
 def _ids_by_name(things: Iterable[FileSatellite | FileGroundStation]) -> Mapping[str, list[str]]:
-    """Return the ids that each name may stand for; an id stands for itself."""
+    """Return the ids that each name may mean; an id means itself."""
     found: dict[str, list[str]] = {}
     for thing in things:
         found.setdefault(thing.name, []).append(thing.id or thing.name)
@@ -138,7 +138,7 @@ def _refuse_duplicates(body: PinsIn) -> None:
 
 
 def pins_in(pins: Pins) -> PinsIn:
-    """Return the body of pins: what `pins_from` has made them of."""
+    """Return the body of pins, the inverse of `pins_from`."""
     return PinsIn(
         keep=[PinnedActionIn(**asdict(pinned)) for pinned in pins.keep],
         skip=[PinnedActionIn(**asdict(pinned)) for pinned in pins.skip],
@@ -153,5 +153,5 @@ def action_from(body: PinnedActionIn) -> PinnedAction:
 
 
 def pinned_action(body: str | PinnedActionIn) -> PinnedAction:
-    """Return the action that is meant; an id alone is that of a target, at any time."""
+    """Return the action that is meant; a mere id means that target, at any time."""
     return PinnedAction(target_id=body) if isinstance(body, str) else action_from(body)

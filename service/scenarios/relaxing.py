@@ -1,4 +1,4 @@
-"""A scenario file with other values of some settings; what is refused points into the change."""
+"""A scenario file with changed settings; errors point into the change."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _OF_TARGETS = TargetIn.model_fields.keys() - {"id", "name", "lat_deg", "lon_deg"
 
 
 def relaxed_file(file: ScenarioFile, relax: RelaxIn) -> ScenarioFile:
-    """Return the file with other settings.
+    """Return the file with changed settings.
 
     Raises
     ------
     InvalidScenario, InvalidElements
-        Nothing of that name, or a value that cannot be; with a pointer into ``/relax``.
+        If a name is unknown or a value is invalid; with a pointer into ``/relax``.
     """
     relaxing = _Relaxing(file)
     relaxing.set_satellites(relax)
@@ -33,7 +33,7 @@ def relaxed_file(file: ScenarioFile, relax: RelaxIn) -> ScenarioFile:
 
 
 class _Relaxing:
-    """A file under change, and where in the body each of its new values stands."""
+    """A file under change, and the location in the body of each new value."""
 
     def __init__(self, file: ScenarioFile):
         self._document: dict[str, Any] = file.model_dump(mode="json")

@@ -1,4 +1,4 @@
-"""From the question that a plan answers to that of the plan which follows it."""
+"""From the scenario of a plan to that of the plan which follows it."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ _PIN: Final = re.compile(r"/pins/(keep|skip)/(\d+)")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Happened:
-    """What a replan starts from, beside what its body says.
+    """What a replan starts from, in addition to its body.
 
     Attributes
     ----------
     base
-        The actions of the plan, less those that failed.
+        The actions of the plan, without those that failed.
     freeze_until
-        What starts before it stays.
+        Actions that start before it stay.
     outages
-        Those stored that concern the question.
+        Stored outages that concern the scenario.
     targets
-        Those of catalogues to be added, by the number of the catalogue in the body.
+        Those of catalogues to be added, with the index of the catalogue in the body.
     begins
-        When the new plan begins; None for when the plan before did.
+        When the new plan begins; None for the beginning of the parent plan.
     states
-        Of satellites, the newest before that instant.
+        Each satellite's newest state before that instant.
     flown
-        What was done before it.
+        The actions done before it.
     elements
-        Satellites with the orbits that are in force now, by id.
+        Satellites with their current orbits, by id.
     """
 
     base: Sequence[PinnedActionIn]
@@ -60,7 +60,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
     Raises
     ------
     ServiceError
-        422, with all that cannot be and where it stands in the body.
+        422, with all faults and their locations in the body.
     """
     targets = [*file.targets, *(FileTarget(**dict(t)) for t in body.add_targets)]
     targets += [target for _, target in happened.targets]
@@ -115,7 +115,7 @@ def replan_file(file: ScenarioFile, body: ReplanIn, happened: Happened) -> Scena
 
 
 def _with_elements(satellite: FileSatellite, newest: Mapping[str, FileSatellite]) -> FileSatellite:
-    """Return a satellite with the orbit that is in force now."""
+    """Return a satellite with its current orbit."""
     now = newest.get(satellite.id or "")
     if now is None:
         return satellite
@@ -123,7 +123,7 @@ def _with_elements(satellite: FileSatellite, newest: Mapping[str, FileSatellite]
 
 
 def _states(file: ScenarioFile, happened: Happened) -> list[StateIn]:
-    """Return where each satellite begins: by telemetry, or as in the plan before."""
+    """Return each satellite's initial state: from telemetry, or as in the parent plan."""
     if happened.begins is None:
         return list(file.states)
     began = {state.satellite_id: state for state in _began(file)}
@@ -131,7 +131,7 @@ def _states(file: ScenarioFile, happened: Happened) -> list[StateIn]:
 
 
 def _began(file: ScenarioFile) -> list[StateIn]:
-    """Return what each satellite of a question begins with, its resources' own levels written."""
+    """Return each satellite's initial state in a scenario, with default levels filled in."""
     known = {state.satellite_id: state for state in file.states}
     found = []
     for satellite in scenario_from_file(file).satellites:
@@ -140,7 +140,7 @@ def _began(file: ScenarioFile) -> list[StateIn]:
         if state is None:
             state = StateIn(satellite_id=satellite.id, at=file.horizon.start)
         levels = {"battery_fraction": r.initial_battery_fraction}
-        if state.on_board is None:  # what is listed says how much it is
+        if state.on_board is None:  # otherwise the list gives the amount
             levels["recorder_fraction"] = r.initial_recorder_fraction
         missing = {name: own for name, own in levels.items() if getattr(state, name) is None}
         found.append(state.model_copy(update=missing))

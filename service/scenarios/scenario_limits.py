@@ -1,4 +1,4 @@
-"""How large a scenario may be: what is larger is refused before any of it is worked out."""
+"""Limits on the size of scenarios: larger ones are refused before any work on them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from planner_core.errors import InvalidScenario
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScenarioLimits:
-    """What the service takes.
+    """The largest scenario that the service accepts.
 
     Attributes
     ----------
     horizon_days
         Longest horizon.
     num_targets
-        Of all catalogues together.
+        In all catalogues together.
     satellite_target_days
-        Satellites times targets times days: the work of an access search, and about half of the
-        opportunities that it finds.
+        Satellites times targets times days: the work of an access search, and about half the
+        number of opportunities that it finds.
     """
 
     horizon_days: float
@@ -29,7 +29,7 @@ class ScenarioLimits:
     satellite_target_days: float
 
     def check(self, horizon: Horizon, num_satellites: int, num_targets: int) -> None:
-        """Refuse a scenario of this size (``horizon_too_long``, ``scenario_too_large``)."""
+        """Refuse a scenario that is too large (``horizon_too_long``, ``scenario_too_large``)."""
         days = horizon.duration_s / 86400.0
         if horizon.end - horizon.start > timedelta(days=self.horizon_days):
             detail = f"The horizon has {days:.2f} days; the limit is {self.horizon_days:g}."

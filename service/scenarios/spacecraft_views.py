@@ -1,4 +1,4 @@
-"""When the satellites of one type see a place: opportunities without a scenario."""
+"""When the satellites of one type see a target: opportunities without a scenario."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _WITHIN_S: Final = 20.0
 
 
 def types_flown(session: Session) -> list[str]:
-    """Return the spacecraft types that satellites are of, by id or built-in name."""
+    """Return the spacecraft types used by satellites, by id or built-in name."""
     wanted = alive(SatelliteRow).with_only_columns(SatelliteRow.spacecraft).distinct()
     return sorted(one for one in session.scalars(wanted) if one is not None)
 
 
 def fleet_of(session: Session, spacecraft_id: str) -> list[FileSatellite]:
-    """Return the satellites of one type, with the elements in force."""
+    """Return the satellites of one type, with their current elements."""
     of_type = alive(SatelliteRow).where(SatelliteRow.spacecraft == spacecraft_id)
     ids = session.scalars(of_type.with_only_columns(SatelliteRow.id).order_by(SatelliteRow.id))
     return satellites_of(session, ids.all())
@@ -41,7 +41,7 @@ def views_of(
     end: datetime,
     limits: ScenarioLimits,
 ) -> Described:
-    """Return the opportunities of a target from start to end.
+    """Return the opportunities of a target between two instants.
 
     Raises
     ------

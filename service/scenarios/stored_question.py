@@ -1,6 +1,6 @@
-"""What exports ask of a stored scenario, read from its canonical form target by target.
+"""What exports need of a stored scenario, read from its canonical form target by target.
 
-As objects a scenario of many targets takes many times the memory of its text.
+As objects, a scenario with many targets takes many times the memory of its text.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ class StoredQuestion:
 
     @cached_property
     def pins(self) -> PinsIn:
-        """Return what is pinned."""
+        """Return the pins."""
         return from_store(PinsIn, self._part("pins") or {})
 
     @cached_property
     def outages(self) -> tuple[PlacedOutage, ...]:
-        """Return what is out."""
+        """Return the outages."""
         return tuple(PlacedOutage.model_validate(one) for one in self._part("outages") or ())
 
     @cached_property
     def states(self) -> tuple[StateIn, ...]:
-        """Return what satellites had before the horizon."""
+        """Return the states of satellites before the horizon."""
         return tuple(StateIn.model_validate(one) for one in self._part("states") or ())
 
     @cached_property
@@ -73,7 +73,7 @@ class StoredQuestion:
         return tuple(ground_station_from(body, str(body.id)) for body in bodies)
 
     def each_target(self) -> Iterator[Target]:
-        """Yield the targets, in their order."""
+        """Yield the targets, in order."""
         _, at = self._before_targets
         while self._content[at] != "]":
             fields, at = self._decoder.raw_decode(self._content, at)
@@ -82,12 +82,12 @@ class StoredQuestion:
             at += self._content[at] == ","
 
     def exported(self, name: str | None) -> str:
-        """Return the scenario as a file of release 2, in which satellites say all their figures.
+        """Return the scenario as a file of release 2, in which satellites give all their figures.
 
         Parameters
         ----------
         name
-            Of the scenario, for people; no part of its content.
+            The scenario's name, for people; not part of its content.
         """
         members, at = self._before_targets
         satellites = []
@@ -96,20 +96,20 @@ class StoredQuestion:
             unset = {"oem", "omm", "spacecraft", "tle"} - body.model_fields_set
             satellites.append(body.model_dump(mode="json", exclude=unset))
         head: dict[str, Any] = {} if name is None else {"name": name}
-        # What is not said of the objective is the paper's, which files of release 2 must say.
+        # A scenario without an objective has the paper's; files of release 2 must say so.
         head |= {"objective": "paper", **members, "release": 2, "satellites": satellites}
         text = json.dumps(head, separators=(",", ":"), allow_nan=False)
         return f'{text[:-1]},"{_TARGETS}":[{self._content[at:]}'
 
     def _part(self, name: str) -> Any:
-        """Return a part that few questions have, None where there is none."""
+        """Return a part that few scenarios have, or None."""
         return self._before_targets[0].get(name) if f'"{name}":' in self._content else None
 
     @cached_property
     def _before_targets(self) -> tuple[dict[str, Any], int]:
-        """Return what stands before the targets, and where their list begins.
+        """Return the members before the targets, and where the list of targets begins.
 
-        Names are in the order of the alphabet, and there are no blanks.
+        Member names are in alphabetical order, and there is no white space.
         """
         members: dict[str, Any] = {}
         at = 1

@@ -69,7 +69,7 @@ def scenario_from_content(content: Mapping[str, Any]) -> Scenario:
 
 
 def read_file(content: Mapping[str, Any]) -> ScenarioFile:
-    """Return a scenario file that fits the schema: every id filled in, every orbit tidy.
+    """Return a scenario file that fits the schema, with all ids filled in and orbits tidied.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def _with_ids(items: Sequence[FileSatellite | FileGroundStation]) -> list[object
 
 
 def scenario_from_file(file: ScenarioFile) -> Scenario:
-    """Return the scenario of a file that `read_file` has made."""
+    """Return the scenario of a file returned by `read_file`."""
     return Scenario(
         horizon=horizon_from(file.horizon),
         satellites=_each(
@@ -131,7 +131,7 @@ def scenario_from_file(file: ScenarioFile) -> Scenario:
 
 
 def _each(part: str, items: Sequence[B], build: Callable[[B], T]) -> tuple[T, ...]:
-    """Return what is made of each thing of a part; errors point to the thing."""
+    """Return what is built from each item of a part; errors point to the item."""
     built = []
     for position, item in enumerate(items):
         with inside(f"/{part}/{position}"):
@@ -140,7 +140,7 @@ def _each(part: str, items: Sequence[B], build: Callable[[B], T]) -> tuple[T, ..
 
 
 def horizon_from(body: HorizonIn) -> Horizon:
-    """Return the horizon; `InvalidScenario` ``horizon_inverted`` where it has no length."""
+    """Return the horizon; `InvalidScenario` ``horizon_inverted`` if it has no length."""
     if body.end <= body.start:
         raise InvalidScenario(
             "horizon_inverted", "The end must be later than the start.", pointer="/horizon/end"
@@ -149,7 +149,7 @@ def horizon_from(body: HorizonIn) -> Horizon:
 
 
 def quality_from(body: QualityIn) -> Quality:
-    """Return the curves; `InvalidScenario` with a pointer to the knot that cannot be."""
+    """Return the quality curves; `InvalidScenario` with a pointer to an invalid knot."""
     return Quality(
         off_nadir_deg=tuple((angle_deg, value) for angle_deg, value in body.off_nadir_deg),
         sun_elevation_deg=tuple((angle_deg, value) for angle_deg, value in body.sun_elevation_deg),
@@ -158,7 +158,7 @@ def quality_from(body: QualityIn) -> Quality:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orbit:
-    """An orbit, and its tidy form as stored: of ``tle``, ``omm`` and ``oem`` the one given."""
+    """An orbit, and its tidy form as stored: the one given of ``tle``, ``omm`` and ``oem``."""
 
     elements: Elements
     stored: dict[str, Any]
@@ -206,7 +206,7 @@ def satellite_from(body: WholeSatellite, satellite_id: str) -> Satellite:
 def figures_from(
     body: TypedFigures | WholeSpacecraft, period_s: float
 ) -> tuple[Agility, Sensor, Resources]:
-    """Return what a spacecraft in an orbit of this period can do.
+    """Return the capabilities of a spacecraft in an orbit of this period.
 
     Raises
     ------
@@ -234,7 +234,7 @@ _FIELDS_OF_RATES = {
 
 
 def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: float) -> Resources:
-    """Return battery and recorder as fractions of their capacity per second.
+    """Return the battery and recorder with rates as fractions of capacity per second.
 
     Presets depend on the orbital period.
     """
@@ -275,7 +275,7 @@ def resources_from(body: Preset | PresetResourcesIn | ResourcesIn, period_s: flo
 
 
 def _in_figures(fault: Fault) -> str:
-    """Return which figure of a body makes the rate that is wrong."""
+    """Return the field of a body from which a wrong rate was computed."""
     pointer = (fault.pointer or "").replace("/downlink_by_elevation", "/downlink_rate_mbit_s")
     return _FIELDS_OF_RATES.get(pointer, pointer)
 

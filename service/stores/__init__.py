@@ -1,1 +1,1 @@
-"""Reading and writing of what the database holds, one module for each kind."""
+"""Reading and writing of the database, one module for each kind of content."""

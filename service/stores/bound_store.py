@@ -1,4 +1,4 @@
-"""Proven bounds of scenarios: every job of a scenario starts from the best one so far."""
+"""Proven bounds of scenarios: each job starts from the best bound so far."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def load(session: Session, sha256: str) -> str | None:
 
 
 def save(session: Session, sha256: str, value: float, proof: str) -> None:
-    """Store a bound of a scenario, where none as low is stored."""
+    """Store a bound of a scenario, unless one as low is stored."""
     own = BoundRow.scenario_sha256 == sha256
     is_beaten = sa.or_(BoundRow.version != VERSION, BoundRow.value > value)
     row = {"version": VERSION, "value": value, "proof": proof, "created_at": utc_now()}
-    # First the insert: where somebody else's comes between, it is there to be beaten.
+    # Insert first: if another transaction's insert comes between, its bound can be beaten.
     if not inserted(session, BoundRow, scenario_sha256=sha256, **row):
         session.execute(sa.update(BoundRow).where(own, is_beaten).values(**row))

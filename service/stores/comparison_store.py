@@ -16,21 +16,21 @@ _BYTES_OF_A_RUN: Final = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """One line: the job, and the numbers of its timeline where it has one."""
+    """One run: the job, and the numbers of its timeline if it has one."""
 
     job: JobRow
     figures: Mapping[str, Any] | None
 
 
 def weight() -> sa.ColumnElement[int]:
-    """Return about how many bytes a comparison has when it is shown."""
+    """Return the approximate number of bytes of a comparison as shown."""
     own = ComparisonRunRow.comparison_id == ComparisonRow.id
     num_runs = sa.select(sa.func.count()).select_from(ComparisonRunRow).where(own)
     return num_runs.correlate(ComparisonRow).scalar_subquery() * _BYTES_OF_A_RUN
 
 
 def runs_of(session: Session, comparison_ids: Iterable[str]) -> dict[str, list[Run]]:
-    """Return the lines of each of these comparisons, in the order of its request."""
+    """Return the runs of each of these comparisons, in the order of its request."""
     ids = list(comparison_ids)
     wanted = (
         sa.select(ComparisonRunRow.comparison_id, JobRow, JobResultRow.figures)

@@ -1,7 +1,7 @@
-"""Deleting for good what is stored of jobs, comparisons, plans and scenarios.
+"""Deleting jobs, comparisons, plans and scenarios for good.
 
-What something else leads to stays: a job of a plan or of a comparison, a scenario of a job. The
-room that a job's answer took is its owner's again.
+Whatever is referred to stays: a job with a plan or comparison, a scenario with a job. The room
+of a deleted job's answer is given back to its owner.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from service.stores import usage_store
 from service.wire.jobs import FINAL
 
 _AT_ONCE: Final = 50
-"""Most of a kind that one sweep deletes in a transaction, so that nobody waits long for it."""
+"""How many of a kind a sweep deletes at most in one transaction, so that it stays short."""
 _KEPT_PLANS: Final = ("approved", "published")
 
 
@@ -47,8 +47,8 @@ def delete_job(session: Session, job: JobRow) -> None:
     Raises
     ------
     ServiceError
-        ``invalid_transition`` while it waits or runs, ``in_use`` where a plan or a comparison has
-        it.
+        ``invalid_transition`` while it waits or runs, ``in_use`` if a plan or a comparison
+        refers to it.
     """
     if job.state not in FINAL:
         raise ServiceError(
@@ -62,18 +62,18 @@ def delete_job(session: Session, job: JobRow) -> None:
 
 
 def delete_comparison(session: Session, comparison_id: str) -> None:
-    """Delete a comparison. Its runs stay jobs like others."""
+    """Delete a comparison. Its runs remain as ordinary jobs."""
     _delete(session, ComparisonRunRow, ComparisonRunRow.comparison_id == comparison_id)
     _delete(session, ComparisonRow, ComparisonRow.id == comparison_id)
 
 
 def delete_plan(session: Session, plan: PlanRow) -> None:
-    """Delete a plan with its history and what was reported of it.
+    """Delete a plan with its history and the reports on it.
 
     Raises
     ------
     ServiceError
-        ``invalid_transition`` while it is approved or published, ``in_use`` where another plan
+        ``invalid_transition`` while it is approved or published, ``in_use`` if another plan
         continues it.
     """
     if plan.state in _KEPT_PLANS:
@@ -88,12 +88,12 @@ def delete_plan(session: Session, plan: PlanRow) -> None:
 
 
 def delete_scenario(session: Session, scenario: ScenarioRow) -> None:
-    """Delete a scenario, with its opportunities and what was proven of it.
+    """Delete a scenario, with its opportunities and proven bounds.
 
     Raises
     ------
     ServiceError
-        ``in_use`` where a job or a comparison has it.
+        ``in_use`` if a job or a comparison refers to it.
     """
     tried = sa.select(JobRow.id).where(JobRow.scenario_id == scenario.id)
     _require_none(session, tried, "The job {!r} is of this scenario.")
@@ -103,11 +103,11 @@ def delete_scenario(session: Session, scenario: ScenarioRow) -> None:
 
 
 def sweep(session: Session, before: datetime) -> int:
-    """Delete some of what is older than this; return how much it was, 0 if there is no more.
+    """Delete some of what is older than an instant; return how much, 0 if nothing is left.
 
-    Jobs go that have ended before, unless a plan has them or a comparison that is younger;
-    comparisons that were made before, once all their runs have ended; scenarios that were stored
-    before, once no job is left of them. Plans stay.
+    Deleted are jobs that ended before it, unless a plan or a younger comparison refers to them;
+    comparisons made before it, when all their runs have ended; and scenarios stored before it,
+    when no job refers to them. Plans stay.
     """
     return (
         _sweep_comparisons(session, before)

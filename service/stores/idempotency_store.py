@@ -1,4 +1,4 @@
-"""Answers kept under the keys of their callers, so that a request can be sent again safely."""
+"""Answers stored under callers' idempotency keys, so that requests can be resent safely."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SWEPT_AT_ONCE: Final = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptAnswer:
-    """What was answered. ``body`` is JSON text."""
+    """A stored answer. ``body`` is JSON text."""
 
     status: int
     headers: dict[str, str]
@@ -26,12 +26,12 @@ class KeptAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Keyed:
-    """A request that came under a key.
+    """A request with an idempotency key.
 
     Attributes
     ----------
     request_sha256
-        Of everything that makes it the same request: call, query and body.
+        Hash of everything that identifies the request: call, query and body.
     keep_s
         How long its answer is kept.
     """
@@ -43,16 +43,16 @@ class Keyed:
 
 
 class KeyReused(Exception):
-    """The key belongs to another request."""
+    """The key was used for another request."""
 
 
 def find(session: Session, keyed: Keyed) -> KeptAnswer | None:
-    """Return what this request was answered before, or None.
+    """Return the earlier answer to this request, or None.
 
     Raises
     ------
     KeyReused
-        Where the key was used for another request.
+        If the key was used for another request.
     """
     wanted = sa.select(IdempotencyKeyRow.request_sha256, IdempotencyKeyRow.answer).where(
         _own(keyed), IdempotencyKeyRow.created_at >= utc_now(-keyed.keep_s)
@@ -66,10 +66,10 @@ def find(session: Session, keyed: Keyed) -> KeptAnswer | None:
 
 
 def claim(session: Session, keyed: Keyed) -> KeptAnswer | None:
-    """Take the key for this transaction; return the answer where somebody else had it first.
+    """Claim the key for this transaction; return the answer if another request has one.
 
-    Of two requests at the same moment the second waits here until the first has ended, and
-    then sees its answer, or takes the key where the first has failed.
+    Of two simultaneous requests, the second waits here until the first has ended, and then sees
+    its answer, or claims the key if the first has failed.
     """
     _sweep(session, keyed)
     is_claimed = inserted(
@@ -94,11 +94,11 @@ def _own(keyed: Keyed) -> sa.ColumnElement[bool]:
 
 
 def _sweep(session: Session, keyed: Keyed) -> None:
-    """Forget this key where it has expired, and some others, so that they do not pile up."""
+    """Delete this key if it has expired, and some other expired ones, to limit their number."""
     has_expired = IdempotencyKeyRow.created_at < utc_now(-keyed.keep_s)
     session.execute(sa.delete(IdempotencyKeyRow).where(_own(keyed), has_expired))
     names = (IdempotencyKeyRow.tenant, IdempotencyKeyRow.key)
-    # Rows that somebody else is sweeping are left to them (PostgreSQL; SQLite has one writer).
+    # Rows that another transaction is sweeping are skipped (PostgreSQL; SQLite has one writer).
     old = sa.select(*names).where(has_expired).limit(_SWEPT_AT_ONCE)
     old = old.with_for_update(skip_locked=True)
     expired = [tuple(row) for row in session.execute(old)]

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from service.db.rows import JobRow, ScenarioRow
 
-# Made once: to make and compile it takes longer than to run it.
+# Built once, since building and compiling them takes longer than running them.
 _THESE: Final = JobRow.id.in_(sa.bindparam("job_ids", expanding=True))
 _VERSIONS: Final = sa.select(JobRow.id, JobRow.version).where(_THESE)
 _OWNERS: Final = sa.select(JobRow.id, JobRow.tenant).where(_THESE)
@@ -30,41 +30,41 @@ def num_waiting(session: Session, owner: str) -> tuple[int, int]:
 
 
 def owner_of(session: Session, job_id: str) -> str | None:
-    """Return whose job this is, or None for no job."""
+    """Return the owner of a job, or None if there is no such job."""
     return owners_of(session.connection(), [job_id]).get(job_id)
 
 
 def owners_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, str]:
-    """Return whose jobs these are, without those that there are not."""
+    """Return the owners of those of these jobs that exist."""
     rows = connection.execute(_OWNERS, {"job_ids": list(job_ids)})
     return {row.id: row.tenant for row in rows}
 
 
 def with_hashes(session: Session, job_ids: Collection[str]) -> dict[str, tuple[JobRow, str]]:
-    """Return those of these jobs that there are, each with its scenario's SHA-256."""
+    """Return those of these jobs that exist, each with its scenario's SHA-256."""
     rows = session.execute(_WITH_HASHES, {"job_ids": list(job_ids)})
     return {job.id: (job, sha256) for job, sha256 in rows}
 
 
 def versions_of(connection: sa.Connection, job_ids: Collection[str]) -> dict[str, int]:
-    """Return the number of each of these jobs that grows with its every visible change."""
+    """Return the version of each of these jobs, which grows with every visible change."""
     rows = connection.execute(_VERSIONS, {"job_ids": list(job_ids)})
     return {row.id: row.version for row in rows}
 
 
 def scenario_hashes(session: Session, jobs: Iterable[JobRow]) -> dict[str, str]:
-    """Return the SHA-256 of each scenario that these jobs plan, by its id."""
+    """Return the SHA-256 of each scenario of these jobs, by scenario id."""
     return hashes_of(session, {job.scenario_id for job in jobs})
 
 
 def hashes_of(session: Session, ids: Collection[str]) -> dict[str, str]:
-    """Return the SHA-256 of each of these scenarios, by its id."""
+    """Return the SHA-256 of each of these scenarios, by id."""
     wanted = sa.select(ScenarioRow.id, ScenarioRow.sha256).where(ScenarioRow.id.in_(ids))
     return {row.id: row.sha256 for row in session.execute(wanted)}
 
 
 def content_of(session: Session, job_id: str) -> str:
-    """Return the scenario file that a job plans."""
+    """Return a job's scenario file."""
     wanted = (
         sa.select(ScenarioRow.content)
         .join(JobRow, JobRow.scenario_id == ScenarioRow.id)

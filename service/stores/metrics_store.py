@@ -1,4 +1,4 @@
-"""What the database tells about the service as a whole, for its operators."""
+"""Figures about the service as a whole from the database, for operators."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from service.wire.timelines import Validity
 from service.wire.webhooks import DeliveryState
 
 ORBITS_OF_LAST_S: Final = 7 * 86400.0
-"""A satellite is in use while a job active or newer than this plans it."""
+"""A satellite is in use if an active job, or one younger than this, plans it."""
 
 
 def num_jobs(session: Session) -> Mapping[str, float]:
-    """Return how many jobs there are, by state, states without a job included."""
+    """Return the number of jobs by state, including states without jobs."""
     return _counted(session, JobRow.state, get_args(JobState))
 
 
 def num_plans(session: Session) -> Mapping[str, float]:
-    """Return how many plans jobs have found, by validity."""
+    """Return the number of plans found by jobs, by validity."""
     return _counted(session, JobRow.validity, get_args(Validity))
 
 
 def num_deliveries(session: Session) -> Mapping[str, float]:
-    """Return how many messages webhooks have, by state; ended ones of the last 30 days."""
+    """Return the number of webhook messages by state; ended ones only of the last 30 days."""
     return _counted(session, WebhookDeliveryRow.state, get_args(DeliveryState))
 
 
@@ -41,13 +41,13 @@ def num_leases_lost(session: Session) -> int:
 
 
 def oldest_waiting_s(session: Session) -> float:
-    """Return how long the oldest waiting job has waited; 0 where none waits."""
+    """Return how long the oldest waiting job has waited; 0 if none waits."""
     waiting_s = sa.select(sa.func.max(seconds_between(JobRow.created_at, utc_now())))
     return session.scalar(waiting_s.where(JobRow.state == "queued")) or 0.0
 
 
 def heartbeat_age_s(session: Session) -> Mapping[str, float]:
-    """Return the age of the last sign of life by worker, dead ones of the last day included."""
+    """Return the age of each worker's last sign of life, including dead ones of the last day."""
     seen_s = sa.select(WorkerRow.id, seconds_between(WorkerRow.seen_at, utc_now()))
     return dict(session.execute(seen_s).all())
 
@@ -55,16 +55,16 @@ def heartbeat_age_s(session: Session) -> Mapping[str, float]:
 def _counted(
     session: Session, column: sa.SQLColumnExpression[Any], values: Sequence[str]
 ) -> dict[str, float]:
-    """Return how many rows have each of these values; those that none has count 0."""
+    """Return the number of rows with each of these values, which may be 0."""
     counted = sa.select(column, sa.func.count()).where(column.is_not(None)).group_by(column)
     found: dict[str, int] = dict(session.execute(counted).all())
     return {value: found.get(value, 0) for value in values}
 
 
 def job_times(session: Session) -> Iterator[tuple[Sequence[str], int, float]]:
-    """Yield solver, state and termination, how many jobs have ended so, and how long they ran.
+    """Yield solver, state and termination, the number of jobs that ended so, and their run time.
 
-    That is from first start to end, in seconds.
+    The run time is their total from first start to end, in seconds.
     """
     termination = sa.func.coalesce(JobRow.termination, "none")
     total_s = sa.func.sum(seconds_between(JobRow.started_at, JobRow.finished_at))
@@ -81,7 +81,7 @@ def job_times(session: Session) -> Iterator[tuple[Sequence[str], int, float]]:
 def orbit_ages(session: Session) -> Iterator[tuple[tuple[str, str], float]]:
     """Yield id and name of each satellite in use, and the seconds since its orbit's epoch.
 
-    They are below 0 where that lies in the future.
+    They are negative if the epoch lies in the future.
     """
     is_in_use = sa.or_(JobRow.state.in_(ACTIVE), JobRow.created_at >= utc_now(-ORBITS_OF_LAST_S))
     planned = sa.select(JobRow.scenario_id).where(is_in_use)

@@ -13,7 +13,7 @@ from service.db.rows import OpportunitySetRow
 from service.db.session import inserted
 
 VERSION: Final = opportunity_version()
-"""Blocks of other code are made anew: nobody has to remember that their form has changed."""
+"""Blocks of other code are recomputed, so nobody has to track changes of their format."""
 
 
 def load(session: Session, sha256: str) -> bytes | None:
@@ -23,7 +23,7 @@ def load(session: Session, sha256: str) -> bytes | None:
 
 
 def save(session: Session, sha256: str, block: bytes) -> None:
-    """Store the block of a scenario; where another one was quicker, that one stays."""
+    """Store the block of a scenario, unless another transaction has stored one already."""
     stale = sa.delete(OpportunitySetRow).where(
         OpportunitySetRow.scenario_sha256 == sha256, OpportunitySetRow.version != VERSION
     )

@@ -1,4 +1,4 @@
-"""Orders in the database: each is a target of its owner's standing catalogue."""
+"""Orders in the database: each is a target in its owner's standing catalogue."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def add(
     Parameters
     ----------
     target
-        As catalogues hold it; its id becomes that of the order.
+        As in catalogues; its id becomes that of the order.
     sent
-        What the order said, for its readers.
+        The content of the order, for its readers.
     """
     take_turns(session, _TURNS)
     catalog = _standing(session, owner)
-    # Not the number of targets: nothing says that positions have no gaps.
+    # Not the number of targets, since positions may have gaps.
     last = sa.select(sa.func.max(TargetRow.position)).where(TargetRow.catalog_id == catalog.id)
     before = session.scalar(last)
     session.add(
@@ -59,7 +59,7 @@ def add(
 
 
 def _standing(session: Session, owner: str) -> TargetCatalogRow:
-    """Return the catalogue that takes the owner's next order; a new one after a deleted one."""
+    """Return the catalogue for the owner's next order; a new one if it is deleted or full."""
     newest = (
         sa.select(TargetCatalogRow)
         .join(OrderRow, OrderRow.catalog_id == TargetCatalogRow.id)

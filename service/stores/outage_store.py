@@ -17,7 +17,7 @@ from service.wire.stored import from_row
 def overlapping(
     query: sa.Select[OutageRow], from_: datetime | None, to: datetime | None
 ) -> sa.Select[OutageRow]:
-    """Return the query of those that overlap a span, of which either end may be open."""
+    """Return the query restricted to a time span, which may be open at either end."""
     if from_ is not None:
         query = query.where(OutageRow.end > from_)
     if to is not None:
@@ -32,12 +32,12 @@ def concerning(
     from_: datetime,
     to: datetime,
 ) -> Sequence[OutageRow]:
-    """Return the outages of these satellites and stations in a span, by their start."""
+    """Return the outages of these satellites and stations in a time span, by start."""
     whose = sa.or_(OutageRow.satellite_id.in_(satellite_ids), OutageRow.station_id.in_(station_ids))
     wanted = overlapping(alive(OutageRow).where(whose), from_, to)
     return session.scalars(wanted.order_by(OutageRow.start, OutageRow.id)).all()
 
 
 def placed(row: OutageRow) -> PlacedOutage:
-    """Return the outage as scenarios take it along."""
+    """Return the outage in the form that scenarios include."""
     return from_row(PlacedOutage, row)

@@ -19,7 +19,7 @@ from service.stores.finding import alive
 from service.wire.satellites import WholeSatellite
 
 FIGURES: Final = ("agility", "sensor", "resources", "spacecraft")
-"""What a satellite can do, and the type that it is of."""
+"""A satellite's capabilities, and its type."""
 _TURNS: Final = "satellites"
 _LONGEST_NAME: Final = 200
 
@@ -28,7 +28,7 @@ Status = Literal["created", "elements_added", "unchanged"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedEntry:
-    """What became of one record of a file."""
+    """The result for one record of a file."""
 
     satellite: SatelliteRow
     status: Status
@@ -43,7 +43,7 @@ def add_satellite(
     Raises
     ------
     ServiceError
-        ``duplicate_norad_cat_id`` where there is one of this catalogue number.
+        ``duplicate_norad_cat_id`` if another satellite has this catalogue number.
     """
     _require_new(session, elements.norad_cat_id)
     figures = body.model_dump(mode="json", include=set(FIGURES))
@@ -55,7 +55,7 @@ def add_satellite(
 
 
 def _require_new(session: Session, norad_cat_id: int) -> None:
-    # Number 0 says nothing.
+    # Number 0 means unknown.
     if norad_cat_id == 0:
         return
     take_turns(session, _TURNS)
@@ -71,7 +71,7 @@ def _require_new(session: Session, norad_cat_id: int) -> None:
 def add_elements(
     session: Session, satellite_id: str, epoch: datetime, orbit: dict[str, Any]
 ) -> ElementSetRow:
-    """Store an element set; one that is there already is returned as it is."""
+    """Store an element set, or return the same one if it is stored already."""
     same_epoch = sa.select(ElementSetRow).where(
         ElementSetRow.satellite_id == satellite_id, ElementSetRow.epoch == epoch
     )
@@ -85,7 +85,7 @@ def add_elements(
 
 
 def in_force(session: Session, satellite_ids: Iterable[str]) -> dict[str, ElementSetRow]:
-    """Return each satellite's newest element set; of two with one epoch, the later stored."""
+    """Return each satellite's newest element set; of two with one epoch, the last stored."""
     newest = (
         sa.func.row_number()
         .over(
@@ -107,10 +107,10 @@ def in_force(session: Session, satellite_ids: Iterable[str]) -> dict[str, Elemen
 def import_entries(
     session: Session, entries: Sequence[Entry], figures: Mapping[str, Any]
 ) -> list[ImportedEntry]:
-    """Store the records of a file; a satellite that is known is never made twice.
+    """Store the records of a file, without duplicating known satellites.
 
-    A catalogue number that is stored already gains the element set, unless it has one of
-    that epoch. Number 0 says nothing, so that there the name counts too. New satellites get
+    A satellite with a stored catalogue number gets the element set, unless it has one of
+    that epoch. Number 0 means unknown, so the name then counts too. New satellites get
     these ``FIGURES``.
     """
     take_turns(session, _TURNS)
@@ -146,13 +146,13 @@ def import_entries(
 def _only_one_named(
     known: Mapping[tuple[int, str], SatelliteRow], name: str
 ) -> tuple[int, str] | None:
-    """Return the key of the satellite of a name, where there is one and no other."""
+    """Return the key of the only satellite with a name; None if there is none or several."""
     keys = [key for key, row in known.items() if row.name == name]
     return keys[0] if len(keys) == 1 else None
 
 
 def _known_satellites(session: Session) -> dict[tuple[int, str], SatelliteRow]:
-    # Oldest first, so that of several with one number the newest stays in the table.
+    # Oldest first, so that of several with the same number the newest remains.
     rows = session.scalars(alive(SatelliteRow).order_by(SatelliteRow.id))
     return {_key(row.norad_cat_id, row.name): row for row in rows}
 
@@ -163,7 +163,7 @@ def _known_epochs(session: Session) -> set[tuple[str, int]]:
 
 
 def _tick(epoch: datetime) -> int:
-    # A TLE has its epoch to 864 microseconds, an OMM made from it may be off by one.
+    # A TLE gives its epoch to 864 microseconds; an OMM made from it may be off by one.
     return round((epoch - datetime(2000, 1, 1, tzinfo=UTC)) / timedelta(microseconds=864))
 
 

@@ -1,6 +1,6 @@
-"""Who sees which scenario, and what each is about.
+"""Who sees which scenario, and which satellites and stations each has.
 
-Those that came with a job are seen by the owner of that job.
+A scenario that came with a job is seen only by the job's owner.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ def find(session: Session, scenario_id: str, owner: str | None) -> ScenarioRow |
 
 
 def let_see(session: Session, scenario_id: str, owner: str) -> None:
-    """Let an owner see a scenario, and from now on nobody else who was not let."""
-    # Another request of this owner may do the same at this moment.
+    """Let an owner see a scenario, which hides it from everybody not let in this way."""
+        # Another request of this owner may do the same just now.
     inserted(session, ScenarioOwnerRow, scenario_id=scenario_id, owner=owner)
 
 
 def let_see_too(session: Session, scenario_id: str, owner: str) -> None:
-    """Let one more owner see a scenario that only some see."""
+    """Let one more owner see a scenario that is not visible to everybody."""
     found = sa.select(ScenarioOwnerRow.owner).where(ScenarioOwnerRow.scenario_id == scenario_id)
     owners = session.scalars(found).all()
     if owners and owner not in owners:
@@ -46,13 +46,13 @@ def let_see_too(session: Session, scenario_id: str, owner: str) -> None:
 
 
 def disown(session: Session, scenario_id: str) -> bool:
-    """Let everybody see a scenario; return whether only some did."""
+    """Let everybody see a scenario; return whether it was hidden from some."""
     owners = sa.delete(ScenarioOwnerRow).where(ScenarioOwnerRow.scenario_id == scenario_id)
     return cast("sa.CursorResult[Any]", session.execute(owners)).rowcount > 0
 
 
 def note_parts(session: Session, scenario_id: str, summary: Mapping[str, Any]) -> None:
-    """Store which satellites and ground stations a scenario has, by its summary."""
+    """Store a scenario's satellites and ground stations, taken from its summary."""
     rows = [
         {"part_id": part_id, "scenario_id": scenario_id, "kind": kind}
         for name, kind in _KINDS.items()
@@ -65,7 +65,7 @@ def note_parts(session: Session, scenario_id: str, summary: Mapping[str, Any]) -
 def with_parts(
     scenario_id: sa.SQLColumnExpression[str], satellite_id: str | None, station_id: str | None
 ) -> Iterator[sa.ColumnElement[bool]]:
-    """Yield the conditions that a scenario has a satellite and a station; None asks nothing."""
+    """Yield conditions that a scenario has a satellite and a station; None sets no condition."""
     for kind, part_id in (("satellite", satellite_id), ("station", station_id)):
         if part_id is not None:
             part = sa.select(ScenarioPartRow.part_id).where(

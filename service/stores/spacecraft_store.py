@@ -1,4 +1,4 @@
-"""Spacecraft types in the database, and bodies filled up from them."""
+"""Spacecraft types in the database, and bodies completed from them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def figures_of(session: Session, spacecraft_id: str) -> Mapping[str, Any] | None:
-    """Return agility, sensor and resources of a type, built in or stored; None for no type."""
+    """Return agility, sensor and resources of a built-in or stored type; None if unknown."""
     if spacecraft_id in BUILT_IN:
         return BUILT_IN[spacecraft_id]
     row = find(session, SpacecraftRow, spacecraft_id)
@@ -27,19 +27,19 @@ def figures_of(session: Session, spacecraft_id: str) -> Mapping[str, Any] | None
 def completed(
     session: Session, given: Mapping[str, Any], shape: type[M], *, names_type: bool = True
 ) -> M:
-    """Return a body with all figures, those of its type where it has none of its own.
+    """Return a body with all figures, taken from its type if it has none of its own.
 
     Parameters
     ----------
     given
-        What a client has sent.
+        The body sent by a client.
     names_type
-        Whether the whole says which type it is of.
+        Whether the result names its type.
 
     Raises
     ------
     ServiceError
-        422 where there is no such type, or where figures do not go together.
+        422 if there is no such type, or if figures do not fit together.
     """
     name = type_named_by(given)
     kind = figures_of(session, name)

@@ -1,4 +1,4 @@
-"""How much of the database each owner has filled."""
+"""How much of the database each owner uses."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MB: Final = 1_000_000
 
 
 def add(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> tuple[int, int]:
-    """Add to what an owner has stored; return its rows and bytes in all."""
+    """Add to an owner's usage; return its total rows and bytes."""
     rows, size = OwnerUsageRow.num_rows, OwnerUsageRow.num_bytes
     more = {"num_rows": rows + num_rows, "num_bytes": size + num_bytes}
     found = changed(session, OwnerUsageRow, OwnerUsageRow.owner == owner, rows, size, **more)
     if found is None:
-        # Somebody else may be the first at this moment.
+        # Another transaction may insert the row just now.
         inserted(session, OwnerUsageRow, owner=owner, num_rows=0, num_bytes=0)
         found = changed(session, OwnerUsageRow, OwnerUsageRow.owner == owner, rows, size, **more)
         assert found is not None
@@ -28,11 +28,11 @@ def add(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> tuple
 
 
 def give_back(session: Session, owner: str, *, num_rows: int, num_bytes: int) -> None:
-    """Take off what an owner has stored no longer."""
+    """Subtract what an owner no longer stores."""
     values = {}
     for column, number in (("num_rows", num_rows), ("num_bytes", num_bytes)):
         left = getattr(OwnerUsageRow, column) - number
-        # What was stored before anybody counted was never added.
+        # What was stored before counting began was never added.
         values[column] = sa.case((left > 0, left), else_=0)
     own = OwnerUsageRow.owner == owner
     changed(session, OwnerUsageRow, own, OwnerUsageRow.owner, **values)
@@ -45,7 +45,7 @@ def used(session: Session, owner: str) -> tuple[int, int]:
 
 
 def require(usage: tuple[int, int], max_rows: int, max_mb: float) -> None:
-    """Raise ``quota_exceeded`` where an owner has stored more than it may."""
+    """Raise ``quota_exceeded`` if an owner stores more than it may."""
     num_rows, num_bytes = usage
     if num_rows > max_rows or num_bytes > max_mb * MB:
         raise ServiceError(

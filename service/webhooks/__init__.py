@@ -1,1 +1,1 @@
-"""Webhooks: what ends is told to those who asked, signed, until they have it."""
+"""Webhooks: signed messages about ended jobs and changed plans, resent until they arrive."""

@@ -1,7 +1,7 @@
-"""Where a webhook may lead: not into the network that the service itself stands in.
+"""Where a webhook may lead: not into the service's own network.
 
-Whoever can name an address here makes the service send requests from inside: to a cloud's
-metadata, to a database's port, to a neighbour without a password.
+Whoever can set an address here makes the service send requests from inside: to a cloud's
+metadata, a database's port, or a neighbour without a password.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 _TRY_OTHERS_AFTER_S: Final = 3.0
 _THIS_MACHINE: Final = ("localhost", "localhost.localdomain", "ip6-localhost")
-# Of these, some networks' gateways make IPv4 addresses: translation (RFC 6052, 8215), site-local
-# (RFC 3879), IPv4-compatible (RFC 4291), IPv4-translated (RFC 2765).
+# Gateways of some networks turn these into IPv4 addresses: translation (RFC 6052, 8215),
+# site-local (RFC 3879), IPv4-compatible (RFC 4291), IPv4-translated (RFC 2765).
 _NOT_PUBLIC: Final = tuple(
     map(
         ipaddress.IPv6Network,
@@ -32,11 +32,11 @@ _NOT_PUBLIC: Final = tuple(
 
 
 class AddressRefused(Exception):
-    """The address is private, or no address at all; the message says which."""
+    """The address is private, or not an address at all; the message says which."""
 
 
 def is_public(address: Address) -> bool:
-    """Return whether an address is one of the internet, whatever it is wrapped in.
+    """Return whether an address is on the public internet, however it is embedded.
 
     >>> [is_public(ipaddress.ip_address(a)) for a in ("9.9.9.9", "10.0.0.1", "::ffff:127.0.0.1")]
     [True, False, False]
@@ -51,17 +51,17 @@ def is_public(address: Address) -> bool:
 
 
 def require_good_url(url: str, *, private: bool) -> None:
-    """Refuse an address that can never be called, before anybody tries.
+    """Refuse an address that can never be called, before any attempt.
 
     Parameters
     ----------
     private
-        Whether addresses of the own network, and HTTP without TLS, are allowed.
+        Whether addresses in the service's own network, and HTTP without TLS, are allowed.
 
     Raises
     ------
     AddressRefused
-        Names are looked up at each delivery only: what they lead to may change.
+        Names are resolved only at each delivery, since their addresses may change.
     """
     try:
         parts = urlsplit(url)
@@ -103,8 +103,8 @@ def _refusal(host: str, address: str) -> str:
 class PublicOnly(httpcore.AnyIOBackend):
     """Connects to public addresses only.
 
-    The name is looked up once, here, and the connection is made to what was looked at: a name
-    cannot lead elsewhere in between.
+    The name is resolved once, here, and the connection is made to the address that was
+    checked, so that the name cannot lead elsewhere in between.
     """
 
     async def connect_tcp(
@@ -115,7 +115,7 @@ class PublicOnly(httpcore.AnyIOBackend):
         local_address: str | None = None,
         socket_options: Iterable[httpcore.SOCKET_OPTION] | None = None,
     ) -> httpcore.AsyncNetworkStream:
-        """Connect to the first address that answers; ``AddressRefused`` where any is private."""
+        """Connect to the first address that answers; ``AddressRefused`` if any is private."""
         found = await asyncio.get_running_loop().getaddrinfo(host, port, type=socket.SOCK_STREAM)
         addresses = [ipaddress.ip_address(entry[4][0]) for entry in found]
         _require_public(host, addresses)

@@ -1,4 +1,4 @@
-"""The courier: a thread in each worker that sends what is due."""
+"""The courier: a thread in each worker that sends due deliveries."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 RETRY_AFTER_S: Final = (5.0, 300.0, 1800.0, 7200.0, 18000.0, 36000.0, 50400.0, 72000.0, 86400.0)
-"""Waits between attempts, as Standard Webhooks proposes them; three days in all."""
+"""Waits between attempts, as proposed by Standard Webhooks; three days in total."""
 
 _MOST_AT_ONCE: Final = 64
 _MOST_OF_AN_OWNER: Final = 4
@@ -47,11 +47,11 @@ class Courier:
     Parameters
     ----------
     look_every_s
-        How often the database is asked for what is due.
+        How often to look in the database for due deliveries.
     private
-        Whether addresses of the own network are allowed.
+        Whether addresses in the service's own network are allowed.
     retry_after_s
-        Waits between attempts; after the last one a delivery has failed.
+        Waits between attempts; after the last one, a delivery has failed.
     """
 
     def __init__(
@@ -77,9 +77,9 @@ class Courier:
         self._thread.start()
 
     def stop(self) -> None:
-        """End. What was being sent comes due again, for whoever looks then."""
+        """End. Deliveries under way come due again, for any courier."""
         self._stopping.set()
-        # It may stand before a database that hangs; nothing of it is needed any more.
+        # The thread may be waiting for a hanging database; its work is no longer needed.
         self._thread.join(_STOP_WITHIN_S)
 
     async def _work(self) -> None:
@@ -110,19 +110,19 @@ class Courier:
         return taken or []
 
     def _is_any_due(self) -> bool:
-        """Look without a transaction: most of the time there is nothing, and writers wait."""
+        """Look without a transaction, since usually nothing is due and writers would wait."""
         try:
             with self._database.asking() as connection:
                 return outbox.is_any_due(connection)
         except SQLAlchemyError:
-            return True  # what is wrong is told by who takes it
+            return True  # taking the deliveries will report the error
 
     async def _in_database(self, work: Callable[[Session], T]) -> T | None:
-        """Do one transaction; None where the database does not serve: it will be due later."""
+        """Run one transaction; None if the database cannot serve, for another try later."""
         try:
             return await asyncio.to_thread(self._transact, work)
         except SQLAlchemyError as error:
-            # Whatever it is, what was due is due later: a courier does not end by it.
+            # After any error, deliveries stay due, and the courier goes on.
             log.warning("webhooks wait: %s", why_unavailable(error) or error, exc_info=True)
             return None
 
@@ -138,7 +138,7 @@ class Courier:
             await self._failed(parcel, why, None, {})
         except AddressRefused as error:
             await self._failed(parcel, str(error), None, {})
-        # UnicodeError: a host that is no name.
+        # UnicodeError: an invalid host name.
         except (OSError, UnicodeError, httpcore.NetworkError, httpcore.ProtocolError) as error:
             await self._failed(parcel, f"{type(error).__name__}: {error}", None, {})
         else:
@@ -150,7 +150,7 @@ class Courier:
             self._busy.pop(parcel.webhook_id, None)
 
     async def _post(self, parcel: Parcel) -> tuple[int, dict[str, str]]:
-        """Send one request; redirects are not followed, and no answer's body is read."""
+        """Send one request, without following redirects or reading the answer's body."""
         now = datetime.now(UTC)
         signature = Webhook(parcel.secret).sign(parcel.id, now, parcel.payload)
         headers: dict[bytes | str, bytes | str] = {
@@ -193,13 +193,13 @@ class Courier:
     def _again_s(self, attempt: int, headers: Mapping[str, str]) -> float | None:
         if attempt > len(self._retry_after_s):
             return None
-        # Spread, so that a receiver that comes back is not met by all at once.
+        # Random, so that a receiver that recovers does not get all deliveries at once.
         wait_s = self._retry_after_s[attempt - 1] * random.uniform(1.0, 1.2)
         return min(max(wait_s, retry_after_s(headers)), _LONGEST_WAIT_S * 1.2)
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float:
-    """Return how long an answer asks to wait; 0 where it does not, or not so that one can tell.
+    """Return how long an answer asks to wait; 0 if it does not, or is unreadable.
 
     >>> retry_after_s({"retry-after": "120"}), retry_after_s({"retry-after": "soon"})
     (120.0, 0.0)

@@ -1,8 +1,7 @@
-"""Deliveries in the database: written in the transaction of what they tell, sent afterwards.
+"""Deliveries in the database: written in the transaction of the event, sent afterwards.
 
-A delivery that was taken comes due again by itself after ``TAKEN_S``: whoever took it and
-died needs no successor to be told. So each is sent at least once, and in rare cases twice with
-the same ``webhook-id``.
+A delivery that was taken comes due again by itself after ``TAKEN_S``, in case its sender
+died. So each is sent at least once, and in rare cases twice with the same ``webhook-id``.
 """
 
 from __future__ import annotations
@@ -29,18 +28,18 @@ from service.wire.webhooks import EventOut, JobEnd, TestData
 TAKEN_S: Final = 60.0
 KEEP_S: Final = 30 * 86400.0
 MOST_PENDING: Final = 1000
-"""Of one webhook. What comes on top has failed at once, and can be sent again by hand."""
+"""Per webhook. Further messages fail at once, and can be resent by hand."""
 _SWEPT_AT_ONCE: Final = 500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parcel:
-    """A delivery that was taken, with all that sending it needs.
+    """A delivery that was taken, with everything needed to send it.
 
     Attributes
     ----------
     attempt
-        1 for the first; also what its outcome must name to be written down.
+        From 1; an outcome is recorded only if it names the current attempt.
     """
 
     id: str
@@ -53,9 +52,9 @@ class Parcel:
 
 
 def tell_end_of(session: Session, job_id: str) -> None:
-    """Queue a delivery for each webhook of the job's owner that asked for this end.
+    """Queue a delivery for each webhook of the job's owner that wants this event.
 
-    It tells enough to decide whether to fetch the rest.
+    The message has enough to decide whether to fetch the rest.
     """
     job = session.get_one(JobRow, job_id, populate_existing=True)
     address = f"/v1/jobs/{job_id}"
@@ -67,7 +66,7 @@ def tell_end_of(session: Session, job_id: str) -> None:
 def tell_plan(
     session: Session, plan: PlanRow, reason: str | None, effective_from: datetime | None
 ) -> None:
-    """Queue a delivery for each webhook of the plan's owner that asked for this transition."""
+    """Queue a delivery for each webhook of the plan's owner that wants this transition."""
     links = {"plan": f"/v1/plans/{plan.id}", "job": f"/v1/jobs/{plan.job_id}"}
     told = {"plan_id": plan.id, "reason": reason, "effective_from": effective_from, "links": links}
     data = from_row(PlanChange, plan, **told)
@@ -94,13 +93,13 @@ def queue(
     job_id: str | None,
 ) -> str:
     """Queue one delivery and return its id."""
-    # Frozen here: each attempt signs and sends the same bytes.
+    # Fixed here, so that each attempt signs and sends the same bytes.
     payload = json.dumps(dumped(EventOut(type=event, timestamp=now(session), data=data)))
     return _add(session, webhook, event, payload, job_id)
 
 
 def repeat(session: Session, webhook: WebhookRow, delivery: WebhookDeliveryRow) -> str:
-    """Queue the same message once more and return the id of the new delivery."""
+    """Queue the same message again and return the id of the new delivery."""
     return _add(session, webhook, delivery.event, delivery.payload, delivery.job_id)
 
 
@@ -127,7 +126,7 @@ def _add(
 
 
 def num_pending(session: Session, webhook_id: str, event: str | None = None) -> int:
-    """Return how many messages wait to be sent to a webhook, of one event or of all."""
+    """Return how many messages wait to be sent to a webhook, for one event or for all."""
     waiting = sa.select(sa.func.count()).where(
         WebhookDeliveryRow.webhook_id == webhook_id, WebhookDeliveryRow.state == "pending"
     )
@@ -137,7 +136,7 @@ def num_pending(session: Session, webhook_id: str, event: str | None = None) -> 
 
 
 def is_any_due(connection: sa.Connection) -> bool:
-    """Return whether there is anything to take, whoever is being sent to."""
+    """Return whether any delivery is due, even to a webhook being sent to."""
     due = sa.select(WebhookDeliveryRow.id).where(
         WebhookDeliveryRow.state == "pending", WebhookDeliveryRow.due_at <= utc_now()
     )
@@ -147,14 +146,14 @@ def is_any_due(connection: sa.Connection) -> bool:
 def take(
     session: Session, *, busy: Mapping[str, str], limit: int, of_an_owner: int
 ) -> list[Parcel]:
-    """Take deliveries that are due, the oldest of each webhook, and count the attempt.
+    """Take due deliveries, the oldest of each webhook, and count the attempt.
 
     Parameters
     ----------
     busy
-        The webhooks that are being sent to, and their owners: a slow one holds up nobody else.
+        Webhooks being sent to, with their owners; they are skipped so as not to delay others.
     limit, of_an_owner
-        How many to take at most, and how many of an owner may be under way.
+        How many to take at most, and how many of one owner may be under way.
     """
     is_due = sa.and_(
         WebhookDeliveryRow.state == "pending",
@@ -196,7 +195,7 @@ def take(
 
 
 def arrived(session: Session, parcel: Parcel, status: int) -> None:
-    """Note that the receiver has it."""
+    """Record that the receiver has it."""
     _update(
         session, parcel.id, parcel.attempt,
         state="delivered", due_at=None, last_status=status, last_error=None, ended_at=utc_now(),
@@ -206,12 +205,12 @@ def arrived(session: Session, parcel: Parcel, status: int) -> None:
 def failed(
     session: Session, parcel: Parcel, why: str, status: int | None, *, again_s: float | None
 ) -> None:
-    """Note a failed attempt.
+    """Record a failed attempt.
 
     Parameters
     ----------
     again_s
-        After how long to try again; None to give up.
+        Seconds until the next attempt; None to give up.
     """
     told: dict[str, Any] = {"last_status": status, "last_error": why}
     if again_s is None:
@@ -222,7 +221,7 @@ def failed(
 
 
 def disable(session: Session, webhook_id: str, why: str) -> None:
-    """Send nothing to this webhook any more."""
+    """Stop sending to this webhook, including pending messages."""
     session.execute(
         sa.update(WebhookRow)
         .where(WebhookRow.id == webhook_id, WebhookRow.disabled_at.is_(None))
@@ -236,7 +235,7 @@ def disable(session: Session, webhook_id: str, why: str) -> None:
 
 
 def sweep(session: Session) -> None:
-    """Forget some deliveries that ended long ago."""
+    """Delete some deliveries that ended long ago."""
     old = sa.select(WebhookDeliveryRow.id).where(WebhookDeliveryRow.ended_at < utc_now(-KEEP_S))
     ids = session.scalars(old.limit(_SWEPT_AT_ONCE)).all()
     if ids:
@@ -244,7 +243,7 @@ def sweep(session: Session) -> None:
 
 
 def _update(session: Session, delivery_id: str, attempt: int, **values: Any) -> sa.Row[Any] | None:
-    """Change a delivery that is still at this attempt; return what it says, None if it is not."""
+    """Change a delivery if it is still at this attempt; return its payload, otherwise None."""
     row = WebhookDeliveryRow
     is_own = sa.and_(row.id == delivery_id, row.attempts == attempt, row.state == "pending")
     return changed(session, row, is_own, row.payload, **values)
