@@ -84,7 +84,7 @@ def _contacts(
 def _volume_mbit(
     satellite: Satellite, action: ActionOut, curves: ResourceCurvesOut | None, origin: datetime
 ) -> float | None:
-    """Return the data that a contact downlinks: the recorder's fall plus what is recorded then."""
+    """Return the data downlinked by a contact: the recorder's fall plus data recorded meanwhile."""
     resources = satellite.resources
     if (
         curves is None

@@ -46,7 +46,7 @@ def steps_of(session: Session, orders: Sequence[OrderRow]) -> list[list[Step]]:
     for order in orders:
         key = order.owner, order.catalog_id
         if key not in known:
-            # Only the owner's plans count, although anybody may read and plan a catalogue.
+            # Plans of others do not count, although anybody may read a catalogue.
             plan_ids = plans_by_catalog(session, order.owner).get(order.catalog_id, [])
             known[key] = plan_ids, lives_of(session, plan_ids)
         found.append(_steps(session, order, *known[key], now))

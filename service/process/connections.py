@@ -23,7 +23,7 @@ _SPARE_FILES: Final = 256
 
 
 class Protocol(HttpToolsProtocol):
-    """Closes connections that do not ask, and some of them if there are too many.
+    """Closes connections that do not ask in time, and idle ones at once if there are too many.
 
     Those that never asked go first, then those whose last answer is the oldest, so that a
     returning client finds its connection open.

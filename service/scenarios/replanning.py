@@ -148,7 +148,7 @@ def _began(file: ScenarioFile) -> list[StateIn]:
 
 
 def _older(file: ScenarioFile, happened: Happened) -> list[StateIn]:
-    """Return the states from which on it is known what is on board, where newer ones are not."""
+    """Return the states since which data on board is known, if newer states do not list it."""
     if happened.begins is None:
         return [] if file.replan is None else file.replan.before
     older = {} if file.replan is None else {s.satellite_id: s for s in file.replan.before}
@@ -160,7 +160,7 @@ def _older(file: ScenarioFile, happened: Happened) -> list[StateIn]:
 
 
 def _pins(before: PinsIn, body: ReplanIn) -> PinsIn:
-    """Return the pins of both. Those of the body come first: faults find their place in it."""
+    """Return both sets of pins, those of the body first, so that faults are found in it."""
     keep = [pin for pin in before.keep if pin not in body.keep and pin not in body.skip]
     skip = [pin for pin in before.skip if pin not in body.keep and pin not in body.skip]
     forbid = dict.fromkeys((*before.forbid, *body.drop_targets))
@@ -174,7 +174,7 @@ def _pins(before: PinsIn, body: ReplanIn) -> PinsIn:
 
 
 def place_in(body: ReplanIn, fault: Fault) -> str | None:
-    """Return where a fault of a pin stands in the body, if it is one of the body's pins."""
+    """Return the location of a pin's fault in the body, if it is one of the body's pins."""
     pin = _PIN.match(fault.pointer or "")
     if pin is None or int(pin[2]) >= len(getattr(body, pin[1])):
         return fault.pointer
@@ -182,7 +182,7 @@ def place_in(body: ReplanIn, fault: Fault) -> str | None:
 
 
 def _promises(file: ScenarioFile, body: ReplanIn) -> list[PromiseIn]:
-    """Return the promises of the body, and those made before that it says nothing of."""
+    """Return the body's promises, and earlier promises for other targets."""
     before = [] if file.replan is None else file.replan.promises
     gone = {promise.target_id for promise in body.promises} | set(body.drop_targets)
     return [*body.promises, *(one for one in before if one.target_id not in gone)]
@@ -228,7 +228,7 @@ def _faults_of_dropped(
 
 
 def _faults_of_unknown(body: ReplanIn, known: Collection[str]) -> list[Fault]:
-    """Return which promises and rewards are of targets that there are not."""
+    """Return faults for promises and rewards of unknown targets."""
     named = [
         (pointer_to("promises", i, "target_id"), promise.target_id)
         for i, promise in enumerate(body.promises)

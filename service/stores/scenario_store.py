@@ -33,7 +33,7 @@ def find(session: Session, scenario_id: str, owner: str | None) -> ScenarioRow |
 
 def let_see(session: Session, scenario_id: str, owner: str) -> None:
     """Let an owner see a scenario, which hides it from everybody not let in this way."""
-        # Another request of this owner may do the same just now.
+    # Another request of this owner may do the same just now.
     inserted(session, ScenarioOwnerRow, scenario_id=scenario_id, owner=owner)
 
 
