@@ -1,5 +1,5 @@
-"""What goes over HTTP: one model for each thing, for the API, its document and the client.
+"""Everything sent over HTTP: one model each, for the API, its OpenAPI document and the client.
 
-Pydantic alone is needed. The models are closed where we write: a field that is not declared
-cannot be sent. `base.read` opens them for readers, who ignore what a newer service adds.
+This package needs only Pydantic. The models are strict for writers: undeclared fields cannot be
+sent. `base.read` relaxes them for readers, who ignore what a newer service adds.
 """

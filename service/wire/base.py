@@ -1,4 +1,4 @@
-"""What all shapes share: closed for who writes, open for who reads; instants, names, ids."""
+"""Bases of all models, strict for writers and lenient for readers; instants, names, ids."""
 
 from __future__ import annotations
 
@@ -77,28 +77,28 @@ Instant = Annotated[
 ]
 
 TEXT: Final = r"^[^\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufffe\uffff]*$"
-"""Every text: without what ends lines, turns the direction of what stands beside it on a page,
-or has no place in XML. Halves of surrogate pairs are no texts at all."""
+"""Pattern of every text: no line ends or control characters, no marks that change the direction
+of neighbouring text, nothing that XML forbids. Lone surrogates are refused as well."""
 _PLAIN: Final = re.compile(TEXT.replace(r"\ufffe", r"\ud800-\udfff\ufffe"))
 
 Name = Annotated[
     str,
     StringConstraints(min_length=1, max_length=200, pattern=TEXT),
-    Field(description="For people; up to 200 printable characters."),
+    Field(description="A name for people to read: up to 200 printable characters."),
 ]
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=TEXT)]
 
 Reason = Annotated[str, StringConstraints(min_length=1, max_length=1000, pattern=TEXT)]
-"""Why, for people; printable characters."""
+"""A reason for people to read; printable characters."""
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
 MOST: Final = 1e9
-"""Of every amount, so that sums and products of amounts stay finite and exact."""
+"""Maximum of every amount, so that sums and products of amounts stay finite and exact."""
 LEAST: Final = 1e-6
-"""Of what is divided by."""
+"""Minimum of every divisor."""
 SHORTEST_S: Final = 1e-3
-"""One step of the clock that instants are told in."""
+"""The resolution of instants."""
 
 Knot = Annotated[list[float], Field(min_length=2, max_length=2)]
 NonNegative = Annotated[float, Field(ge=0, le=MOST)]
@@ -107,7 +107,7 @@ Duration = Annotated[float, Field(ge=SHORTEST_S, le=MOST)]
 
 
 def is_plain(text: str) -> bool:
-    r"""Return whether a text is one that may be sent, stored and exported.
+    r"""Return whether a text may be sent, stored and exported.
 
     >>> [is_plain(text) for text in ("EYE-1 é", "a\u0085b", "a\u202eb", "\ud800")]
     [True, False, False, False]
@@ -116,7 +116,7 @@ def is_plain(text: str) -> bool:
 
 
 def require_plain(value: T) -> T:
-    """Refuse texts, and numbers beyond any float, that stand somewhere in free JSON."""
+    """Return free JSON; refuse it if it holds a forbidden text or a number beyond any float."""
     waiting: list[object] = [value]
     while waiting:
         part = waiting.pop()
@@ -132,7 +132,7 @@ def require_plain(value: T) -> T:
 
 
 Free = Annotated[T, BeforeValidator(require_plain)]
-"""JSON whose fields are not declared; checked all the same for what no text or number may be."""
+"""JSON whose fields are not declared; forbidden texts and numbers in it are still refused."""
 
 
 def _open(value: object, known: ValidatorFunctionWrapHandler, info: ValidationInfo) -> object:
@@ -140,16 +140,16 @@ def _open(value: object, known: ValidatorFunctionWrapHandler, info: ValidationIn
 
 
 Open = Annotated[T, WrapValidator(_open)]
-"""One of some words. Readers take any: a newer service may have more of them."""
+"""One of a set of words. Readers accept any word, as a newer service may add some."""
 
 
 def _for_readers(schema: Json) -> None:
-    """Let the OpenAPI document say what readers may count on: more fields may come."""
+    """Allow further fields in the OpenAPI schema of an answer: a newer service may add some."""
     schema.pop("additionalProperties", None)
 
 
 class Wire(BaseModel):
-    """Base of all that is sent."""
+    """Base of everything that is sent."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_for_readers)
 
@@ -159,17 +159,17 @@ class Wire(BaseModel):
 
 
 class Stored(Wire):
-    """Base of what has an ETag, which names its state and stands in a header."""
+    """Base of resources with an ETag, which identifies their state and is sent in a header."""
 
     _etag: str | None = PrivateAttr(None)
 
     @property
     def etag(self) -> str | None:
-        """What names its state, for who has read it on its own."""
+        """The ETag of its state, if it was read on its own; None if it was read from a list."""
         return self._etag
 
     def with_etag(self, etag: str | None) -> Self:
-        """Return the same as it was answered under this ETag."""
+        """Return a copy that has this ETag."""
         copy = self.model_copy()
         copy._etag = etag
         return copy
@@ -183,17 +183,17 @@ class Listed(Wire, Generic[T]):
 
 
 def dumped(model: BaseModel, include: set[str] | None = None) -> Json:
-    """Return a model as JSON has it, or some of its fields."""
+    """Return a model, or some of its fields, as JSON values."""
     return model.model_dump(mode="json", include=include)
 
 
 def fields_of(body: BaseModel, shape: type[BaseModel]) -> dict[str, Any]:
-    """Return those values of a body that are fields of this shape, as they are."""
+    """Return the values of a body that are fields of this shape, without converting them."""
     return {name: getattr(body, name) for name in shape.model_fields}
 
 
 def read(model: type[M], text: str | bytes) -> M:
-    """Return what an answer says: fields and words that are not known here do no harm."""
+    """Parse an answer; ignore unknown fields and accept unknown words."""
 
     def validate(text: str | bytes) -> M:
         return model.model_validate_json(text, extra="ignore", context=_READING)
@@ -216,7 +216,7 @@ class Body(Wire):
     @model_validator(mode="before")
     @classmethod
     def _is_no_dump(cls, value: object) -> object:
-        # Each field too many would be told of, which takes a hundred times its own memory.
+        # Pydantic would report every excess field, at a hundred times the field's own memory.
         if isinstance(value, dict) and len(value) > _MOST_FIELDS:
             raise PydanticCustomError(
                 "too_many_fields",
@@ -227,7 +227,7 @@ class Body(Wire):
 
 
 class Patch(Body):
-    """Base of what changes a part of a thing."""
+    """Base of partial updates."""
 
     @model_validator(mode="after")
     def _changes_something(self) -> Self:

@@ -1,4 +1,4 @@
-"""What clients send to ask what if: actions forced or forbidden, other values of settings."""
+"""What-if questions of clients: actions forced or forbidden, and changed settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PART_OF: Final[dict[str, str]] = {
     **dict.fromkeys(SensorIn.model_fields, "sensor"),
     **dict.fromkeys(ResourcesIn.model_fields, "resources"),
 }
-"""Which part of a satellite has a setting."""
+"""The part of a satellite that each setting belongs to."""
 
 
 def _show_settings(schema: dict[str, Any]) -> None:
@@ -28,30 +28,30 @@ def _show_settings(schema: dict[str, Any]) -> None:
 
 
 class RelaxIn(Body):
-    """Other values of settings, tighter or looser.
+    """Changed settings, tighter or looser.
 
-    Beside the fields here it takes every setting of `agility`, `sensor` and `resources`, by
-    its own name. The `change` of a reason and `access_changes` of an explanation fit as they are.
+    Besides these fields it accepts every setting of `agility`, `sensor` and `resources` by name.
+    The `change` of a reason and each of an explanation's `access_changes` can be sent unchanged.
     """
 
     model_config = ConfigDict(extra="allow", json_schema_extra=_show_settings)
     __pydantic_extra__: dict[str, JsonValue]
 
     satellite_id: Id | None = Field(
-        None, description="Whose settings stand beside this; those of all satellites by default."
+        None, description="Satellite to which settings apply by name; all satellites by default."
     )
     satellites: dict[Id, dict[str, JsonValue]] = Field(
-        {}, description="By satellite: settings of its own, which come before the others."
+        {}, description="By satellite: settings of its own, which override the others."
     )
     targets: dict[Id, dict[str, JsonValue]] = Field(
         {}, description="By target: its own limits, times, `reward` or `collect_s`."
     )
-    horizon_end: Instant | None = Field(None, description="When planning ends instead.")
+    horizon_end: Instant | None = Field(None, description="New end of the horizon.")
     drop_actions: list[Id] = Field(
-        [], max_length=10_000, description="Ids of actions of the job's plan that are left out."
+        [], max_length=10_000, description="Ids of actions of the job's plan to leave out."
     )
     opportunity_id: Id | None = Field(
-        None, description="What a reason's `change` speaks of; by itself it changes nothing."
+        None, description="Named in a reason's `change`; it changes nothing by itself."
     )
 
     @model_validator(mode="before")
@@ -66,7 +66,7 @@ class RelaxIn(Body):
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is to be different."""
+        """Whether nothing is changed."""
         told = (self.settings, self.satellites, self.targets, self.horizon_end, self.drop_actions)
         return not any(told)
 
@@ -82,7 +82,7 @@ ActionField = Annotated[
 
 
 class ChangeIn(Body):
-    """What is to be different."""
+    """Changes to a question."""
 
     force: list[ActionField] = Field(
         [],
@@ -92,7 +92,7 @@ class ChangeIn(Body):
     forbid: list[ActionField] = Field(
         [],
         max_length=1000,
-        description="Ids of targets, or actions as in `pins.skip`, that it may not hold.",
+        description="Ids of targets, or actions as in `pins.skip`, that the plan may not hold.",
     )
     relax: RelaxIn = RelaxIn()
 
@@ -106,5 +106,5 @@ class ChangeIn(Body):
 
     @property
     def needs_plan(self) -> bool:
-        """Whether it speaks of the plan that the job has found."""
+        """Whether it refers to the plan that the job has found."""
         return bool(self.relax.drop_actions) or any(isinstance(a, str) for a in self.force)

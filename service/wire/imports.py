@@ -1,4 +1,4 @@
-"""What imports of files answer."""
+"""Answers to imports of files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class RejectedRow(Wire):
 
 
 class Imported(Wire, Generic[T]):
-    """What an import stored, and what it did not."""
+    """The records that an import stored, and those it did not."""
 
     accepted: int
     rejected: int

@@ -1,4 +1,4 @@
-"""Jobs, the questions they plan, what varies them, and comparisons of several."""
+"""Jobs, the questions they plan, what-ifs, and comparisons of several jobs."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ MAX_RUNS: Final = 32
 
 
 class LimitsIn(Body):
-    """What a job may use; the server's defaults where it says nothing."""
+    """Limits of a job; those left out are the server's defaults."""
 
     time_s: float | None = Field(
         None,
         gt=0,
-        description="Seconds of work; the search then answers with its best plan, "
-        "which is its first one where the time was too short for more.",
+        description="Seconds of work, after which the search returns the best plan so far "
+        "(its first plan, if there was no time for more).",
     )
     memory_mb: int | None = Field(
-        None, ge=64, le=1_000_000, description="Megabytes; a job that holds more is failed."
+        None, ge=64, le=1_000_000, description="Megabytes; a job that uses more fails."
     )
 
 
@@ -45,7 +45,7 @@ InlineScenario = Annotated[
 
 
 class QuestionIn(Body):
-    """A scenario to plan, stored or sent along, and what a job of it may use."""
+    """A scenario to plan, stored or inline, and the limits of a job."""
 
     scenario_id: Id | None = Field(None, description="A stored scenario.")
     scenario: InlineScenario | None = Field(
@@ -59,25 +59,25 @@ class QuestionIn(Body):
 
 
 class SolverIn(Body):
-    """A solver and how it is to search."""
+    """A solver and its settings."""
 
-    solver: Id = Field(description="A name of `GET /v1/solvers`.")
+    solver: Id = Field(description="A name from `GET /v1/solvers`.")
     params: Free[dict[str, Any]] = Field(
-        {}, description="The solver's own; the others are defaults."
+        {}, description="Parameters of the solver; those left out have their defaults."
     )
-    seed: int = Field(0, ge=0, lt=2**63, description="Same seed, same plan.")
+    seed: int = Field(0, ge=0, lt=2**63, description="The same seed gives the same plan.")
 
 
 class JobIn(QuestionIn, SolverIn):
-    """A scenario, the solver that is to plan it, and how."""
+    """A scenario, and the solver that plans it."""
 
 
 class WhatIfIn(ChangeIn):
-    """A change to the question of a job. What is left out is as in that job."""
+    """A change to the question of a job. Fields left out are as in that job."""
 
-    solver: Id | None = Field(None, description="A name of `GET /v1/solvers`.")
+    solver: Id | None = Field(None, description="A name from `GET /v1/solvers`.")
     params: Free[dict[str, Any] | None] = Field(
-        None, description="The solver's own; the others are its defaults."
+        None, description="Parameters of the solver; those left out have their defaults."
     )
     seed: int | None = Field(None, ge=0, lt=2**63)
     limits: LimitsIn = LimitsIn()
@@ -86,14 +86,14 @@ class WhatIfIn(ChangeIn):
 
 
 class ScenarioRef(Wire):
-    """Which question a job answers."""
+    """The scenario that a job plans."""
 
     id: str
     sha256: str
 
 
 class ProgressOut(Wire):
-    """How far the work is; `fraction` counts within the phase."""
+    """Progress of a job; `fraction` is that of the phase."""
 
     phase: Open[Literal["access", "compile", "solve", "verify"]]
     fraction: float
@@ -103,7 +103,7 @@ class ProgressOut(Wire):
 
 
 class LimitsOut(Wire):
-    """What a job may use."""
+    """Limits of a job."""
 
     time_s: float
     memory_mb: int
@@ -117,7 +117,7 @@ class ErrorOut(Wire):
 
 
 class JobOut(Stored):
-    """A job as it stands."""
+    """A job in its present state."""
 
     id: str
     state: Open[JobState]
@@ -126,7 +126,7 @@ class JobOut(Stored):
     params: Json
     seed: int
     limits: LimitsOut
-    attempt: int = Field(description="Grows when a job is started again; 1 at first.")
+    attempt: int = Field(description="1 at first; grows with each further start.")
     priority: int
     label: str | None
     progress: ProgressOut | None
@@ -137,31 +137,31 @@ class JobOut(Stored):
     error: ErrorOut | None
     validity: Open[Validity] | None = Field(
         None,
-        description="Of its plan, by the referee; `inherited`: only what it began with breaks "
-        "limits. Null without a plan.",
+        description="The referee's verdict on its plan; `inherited`: only the initial state or "
+        "frozen actions break limits. Null without a plan.",
     )
     warnings: tuple[str, ...] = Field((), description="About its plan, for people.")
     change: Json | None = Field(
         None,
-        description="Of a what-if: what was to be different from the job it varies. Of a replan: "
-        "the plan it follows (`replan_of`), its draft (`plan_id`) and `freeze_until`.",
+        description="For a what-if: the changes to the original job. For a replan: the plan it "
+        "follows (`replan_of`), its draft (`plan_id`) and `freeze_until`.",
     )
     links: dict[str, str]
 
     @property
     def is_final(self) -> bool:
-        """Whether it changes no more."""
+        """Whether it can no longer change."""
         return self.state in FINAL
 
 
 class ComparisonIn(QuestionIn):
-    """A scenario and the solvers that are to plan it; limits, priority, label are of each job."""
+    """A scenario and the solvers to compare; limits, priority and label apply to each job."""
 
     runs: list[SolverIn] = Field(min_length=1, max_length=MAX_RUNS)
 
 
 class FiguresOut(Wire):
-    """Numbers of a run's timeline; all null as long as it has none."""
+    """Figures of a run's timeline; all null until it has one."""
 
     reward: float | None = Field(None, description="As the referee awarded it.")
     bound: float | None = Field(None, description="No plan of the scenario can exceed it.")
@@ -170,21 +170,21 @@ class FiguresOut(Wire):
     collects: int | None = None
     contacts: int | None = None
     downlinked_mbit: float | None = Field(
-        None, description="Null too where a recorder has no capacity in megabits."
+        None, description="Also null if a recorder has no capacity in megabits."
     )
     downlinked_fraction: float | None = Field(
-        None, description="In multiples of what the recorders hold."
+        None, description="Sum over satellites, each in multiples of its recorder's capacity."
     )
     delivered: int | None = Field(None, description="Images on the ground by the end.")
-    age_s: AgesOut | None = Field(None, description="Of those images, when they are down.")
-    solve_s: float | None = Field(None, description="Of the search alone.")
-    runtime_s: float | None = Field(None, description="Of the whole job's work.")
+    age_s: AgesOut | None = Field(None, description="Ages of those images on delivery.")
+    solve_s: float | None = Field(None, description="Seconds of the search alone.")
+    runtime_s: float | None = Field(None, description="Seconds of the job's whole work.")
     validity: str | None = None
     plan_sha256: str | None = None
 
 
 class ComparedRun(FiguresOut):
-    """One line of the table."""
+    """One row of the table."""
 
     job_id: str
     state: Open[JobState]

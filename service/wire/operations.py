@@ -1,4 +1,4 @@
-"""Problems, solvers, and what operators ask."""
+"""Problems, solvers, health, audit events and callers."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Scope = Literal["read", "submit", "approve", "admin"]
 
 
 class FaultOut(Wire):
-    """One thing that is wrong, and where."""
+    """One error, and where it is."""
 
-    pointer: str | None = Field(description="JSON pointer into the body, where it was JSON.")
+    pointer: str | None = Field(description="JSON pointer into the body, if it was JSON.")
     code: str
     row: int | None = Field(description="Line of the file, from 1; a header is line 1.")
     detail: str
@@ -55,17 +55,17 @@ class Live(Wire):
 
 
 class Ready(Wire):
-    """Jobs can be taken and run."""
+    """Jobs can be accepted and run."""
 
     status: str = "ready"
     database: str = "ok"
     queue: str = "ok"
-    workers: int = Field(description="Workers heard of in the last 30 seconds.")
+    workers: int = Field(description="Workers that reported in the last 30 seconds.")
     last_heartbeat: Instant
 
 
 class Version(Wire):
-    """What runs here."""
+    """The name and version of the service."""
 
     name: str = "slewline"
     version: str
@@ -85,7 +85,7 @@ class AuditEventOut(Wire):
 
     id: str
     at: Instant
-    owner: str = Field(description="Whose key it was; `local` without a key.")
+    owner: str = Field(description="Owner of the key; `local` without a key.")
     key_id: str | None
     key_name: str | None
     request_id: str | None = Field(description="As in the answer's `X-Request-ID` and the logs.")
@@ -97,7 +97,7 @@ class AuditEventOut(Wire):
 class CallerOut(Wire):
     """The caller of this request."""
 
-    owner: str = Field(description="Whose jobs it sends; `local` without a key.")
+    owner: str = Field(description="Owner of the jobs it sends; `local` without a key.")
     scope: Open[Scope] = Field(
         description="Each of read, submit, approve and admin includes those before it."
     )

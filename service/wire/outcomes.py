@@ -1,4 +1,4 @@
-"""What became of each target, and why."""
+"""The outcome of each target, and the reasons."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ class ReasonOut(Wire):
     code: str
     certainty: str = Field(description="`proven`, `verified` or `heuristic`; more may be added.")
     blocking_actions: tuple[str, ...] = Field((), description="Ids of the actions in its way.")
-    opportunity_id: str | None = Field(None, description="The one that comes closest.")
+    opportunity_id: str | None = Field(None, description="The opportunity that comes closest.")
     at: Instant | None = None
     reward_delta: float | None = Field(
-        None, description="What the plan would earn more with it in place of those actions."
+        None, description="Extra reward if the opportunity replaced those actions."
     )
     change: Json | None = Field(
-        None, description="The cheapest that would let it in, as `relax` of a what-if takes it."
+        None, description="The cheapest change that would allow it, as `relax` of a what-if."
     )
     detail: str = ""
 
 
 class TargetItem(Wire):
-    """What became of one target."""
+    """The outcome of one target."""
 
     target_id: str
     target_name: str | None = None
@@ -48,24 +48,24 @@ class AttemptOut(Wire):
     start: Instant
     end: Instant
     violations: tuple[ViolationOut, ...] = Field(
-        description="What the plan with it breaks, and did not break before."
+        description="Violations that adding it to the plan would cause."
     )
     displaces: tuple[str, ...] = Field(
-        description="Ids of the actions that have to go for it; of a pinned opportunity's rivals "
-        "where `ruled_out`."
+        description="Ids of the actions that must be removed for it; if `ruled_out`, those of the "
+        "pinned actions in its way."
     )
-    fits_instead: bool = Field(description="The plan with it and without those is valid.")
-    reward_delta: float | None = Field(description="What that plan earns more.")
-    ruled_out: bool = Field(description="A pin or an outage rules it out.")
+    fits_instead: bool = Field(description="Whether the plan is valid with it instead of those.")
+    reward_delta: float | None = Field(description="Extra reward of that plan.")
+    ruled_out: bool = Field(description="Whether a pin or an outage rules it out.")
 
 
 class ExplanationOut(TargetItem):
-    """What became of a target, and what of each of its opportunities."""
+    """The outcome of a target, and of each of its opportunities."""
 
     opportunities: tuple[AttemptOut, ...] = Field(
-        description="In order of time; none of a target that is collected."
+        description="In order of time; empty if the target is collected."
     )
     access_changes: tuple[Json, ...] = Field(
-        description="For a target without access: changes that would give it one, each by itself "
-        "and in the form that `relax` of a what-if takes."
+        description="For a target without access: changes that would each give it one, in the "
+        "form of `relax` of a what-if."
     )

@@ -1,4 +1,4 @@
-"""Passes: satellites over ground stations, with what a plan does in them."""
+"""Passes of satellites over ground stations, and what a plan does in them."""
 
 from __future__ import annotations
 
@@ -28,13 +28,15 @@ class PassOut(Wire):
     tca: Instant = Field(description="When the satellite is highest.")
     los: Instant = Field(description="Loss of signal.")
     max_elevation_deg: float = Field(description="At `tca`.")
-    aos_cut: bool = Field(description="The pass began before the horizon; `aos` is its start.")
-    los_cut: bool = Field(description="The pass goes on after the horizon; `los` is its end.")
+    aos_cut: bool = Field(
+        description="Whether `aos` is the horizon's start: the pass began earlier."
+    )
+    los_cut: bool = Field(description="Whether `los` is the horizon's end: the pass ends later.")
     planned: bool = Field(description="Whether the plan has a contact in it.")
-    action_ids: tuple[str, ...] = Field(description="These contacts, as in the timeline.")
+    action_ids: tuple[str, ...] = Field(description="Those contacts, as in the timeline.")
     volume_mbit: float | None = Field(
-        description="What they bring down by the plan; null where none is planned, or where "
-        "recorders have no capacity in megabits."
+        description="Data that these contacts downlink in the plan; null if none is planned or "
+        "the recorder has no capacity in megabits."
     )
     conflicts: tuple[PassConflictOut, ...] = Field(
         description="Passes of other satellites that overlap this one at the station."

@@ -19,48 +19,48 @@ OF_ACTIONS: Final = frozenset(
         "delivered_at", "age_s", "battery_fraction_end", "recorder_fraction_end", "outcome",
     )
 )  # fmt: skip
-"""What actions of timelines and plans tell."""
+"""Fields of actions in timelines and plans."""
 
 
 class PinnedActionIn(Body):
-    """An action in words: a booked contact, a promised image.
+    """A description of an action, such as a booked contact or a promised image.
 
-    An action of a timeline or of a plan is taken as it is: its `mode` tells that it is one.
+    An action copied from a timeline or a plan, recognised by its `mode`, is accepted unchanged.
     """
 
     satellite_id: Id | None = Field(
-        None, description="Or the name of one satellite alone. Any satellite by default."
+        None, description="Or the name of a satellite, if it is unique. Any satellite by default."
     )
-    target_id: Id | None = Field(None, description="Of the image.")
+    target_id: Id | None = Field(None, description="Target of the image.")
     station_id: Id | None = Field(
-        None, description="Of the contact; or the name of one station alone."
+        None, description="Station of the contact; or its name, if it is unique."
     )
     start: Instant | None = Field(
         None,
-        description="Of the opportunities that start and end touch, the one that starts nearest "
-        "to start is meant. Needed where there are several.",
+        description="Selects, of the opportunities that overlap the span from start to end, the "
+        "one that starts nearest to start. Required if there are several.",
     )
-    end: Instant | None = Field(None, description="start by default.")
+    end: Instant | None = Field(None, description="Defaults to start.")
     opportunity_id: Id | None = Field(
-        None, description="The opportunity itself, as the scenario lists it, in place of the rest."
+        None, description="The scenario's id of the opportunity, instead of the other fields."
     )
 
     @model_validator(mode="before")
     @classmethod
     def _of_a_plan(cls, value: object) -> object:
-        """Leave out what an action tells beyond a pin."""
+        """Drop the fields of an action that a pin does not have."""
         if not isinstance(value, dict) or "mode" not in value:
             return value
         if value["mode"] not in get_args(PinnedMode):
             raise PydanticCustomError("no_pinned_mode", "Only collects and contacts are pinned")
-        # The same opportunity has another id in another scenario; times and places say it all.
+        # Ids of opportunities differ between scenarios; times and sites suffice.
         own = cls.model_fields.keys() - {"opportunity_id"}
         dropped = OF_ACTIONS - own
         return {name: part for name, part in value.items() if name not in dropped}
 
 
 class BlockedIn(Body):
-    """A span in which a satellite may not image, not contact, or neither."""
+    """A span in which a satellite may not take images, contact stations, or either."""
 
     satellite_id: Id
     start: Instant
@@ -69,29 +69,29 @@ class BlockedIn(Body):
 
 
 class OutageIn(Body):
-    """A span in which a satellite or a ground station is not to be had."""
+    """A span in which a satellite or a ground station is not available."""
 
-    satellite_id: Id | None = Field(None, description="Either a satellite ...")
-    station_id: Id | None = Field(None, description="... or a station is out.")
+    satellite_id: Id | None = Field(None, description="The satellite that is out, or null.")
+    station_id: Id | None = Field(None, description="The station that is out, or null.")
     start: Instant
     end: Instant
     modes: list[Open[PinnedMode]] = Field(
         ["collect", "contact"],
         min_length=1,
         max_length=2,
-        description="What a satellite cannot do meanwhile; a station's outage takes its contacts.",
+        description="What a satellite cannot do meanwhile; a station's outage rules out contacts.",
     )
-    reason: Reason | None = Field(None, description="For people: safe mode, antenna in service.")
+    reason: Reason | None = Field(None, description="For people, such as: safe mode.")
 
 
 class PlacedOutage(OutageIn):
     """An outage of a scenario."""
 
-    id: Id | None = Field(None, description="Of the one under `/v1/outages` that it was.")
+    id: Id | None = Field(None, description="Its id under `/v1/outages`, if stored there.")
 
 
 class OutageOut(Wire):
-    """An outage that is stored."""
+    """A stored outage."""
 
     id: str
     satellite_id: str | None
@@ -106,16 +106,16 @@ class OutageOut(Wire):
 
 
 class AttitudeIn(Body):
-    """Where a satellite looks: exactly one of these. `"sun"` is short for `{"sun": true}`."""
+    """Attitude of a satellite: exactly one of these. `"sun"` is short for `{"sun": true}`."""
 
-    sun: Literal[True] | None = Field(None, description="Its panels are at the sun.")
+    sun: Literal[True] | None = Field(None, description="Its panels point at the sun.")
     target_id: Id | None = Field(None, description="It tracks this target.")
     station_id: Id | None = Field(None, description="It tracks this ground station.")
     opportunity_id: Id | None = Field(
-        None, description="It tracks the place of this opportunity of the scenario."
+        None, description="It tracks the site of this opportunity of the scenario."
     )
     line_of_sight: Annotated[list[float], Field(min_length=3, max_length=3)] | None = Field(
-        None, description="A unit vector in TEME at that instant; the satellite is at rest."
+        None, description="Unit vector in TEME at that instant; the satellite is at rest."
     )
 
     @model_validator(mode="after")
@@ -140,42 +140,42 @@ class OnBoardIn(Body):
     collected_at: Instant = Field(description="The end of its collect.")
     mbit: NonNegative | None = Field(
         None,
-        description="What is left of it; 0 where it is on the ground, and its target needs no "
-        "other image.",
+        description="Data still to be downlinked; 0 if the image is on the ground and its target "
+        "needs no other image.",
     )
     recorder_fraction: Fraction | None = Field(
-        None, description="The same in place of `mbit`, as a fraction of the recorder."
+        None, description="The same as a fraction of the recorder, instead of `mbit`."
     )
     worth: NonNegative | None = Field(
-        None, description="Of the image, whole; null for its target's reward."
+        None, description="Worth of the whole image; null for its target's reward."
     )
 
 
 class StateIn(Body):
-    """What a satellite had before the horizon; until that begins it idles."""
+    """State of a satellite before the horizon; it idles until the horizon begins."""
 
     satellite_id: Id
     at: Instant = Field(description="The horizon's start, or up to seven days before it.")
     battery_fraction: Fraction | None = Field(
-        None, description="Of capacity at that instant; null for what `resources` say of the start."
+        None, description="Charge at that instant; null for the initial value in `resources`."
     )
-    recorder_fraction: Fraction | None = Field(None, description="Likewise, of the recorder.")
+    recorder_fraction: Fraction | None = Field(None, description="Likewise for the recorder.")
     attitude: AttitudeIn | None = Field(
         None,
-        description="Where it looked: no task begins before it can have turned to it from there. "
-        "Null where that is not known: the first task needs no turn.",
+        description="Attitude at that instant: the first task starts only after a slew from it. "
+        "Null if unknown: the first task then needs no slew.",
     )
     on_board: list[OnBoardIn] | None = Field(
         None,
         max_length=100_000,
-        description="Images that come down first, in this order, and then what else the recorder "
-        "holds; their targets need no other image. Null where that is not known: a replan then "
-        "goes by the plan and what was reported of it.",
+        description="Images on board; they are downlinked first, in this order, before the other "
+        "data on the recorder. Their targets need no other image. Null if unknown: a replan then "
+        "relies on the plan and its execution reports.",
     )
 
 
 class PinsIn(Body):
-    """What plans must hold, and what they must not."""
+    """Actions that plans must hold, and those they must not."""
 
     keep: list[PinnedActionIn] = Field(
         [], max_length=10_000, description="Actions that every plan must hold."

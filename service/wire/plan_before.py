@@ -1,4 +1,4 @@
-"""The plan that a scenario's plans go on from."""
+"""The previous plan that a scenario's plans continue."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ class PromiseIn(Body):
     """A target that the plan images, at whatever time."""
 
     target_id: Id
-    image_by: Instant | None = Field(None, description="When the image must have ended.")
-    deliver_by: Instant | None = Field(None, description="When it must be on the ground.")
+    image_by: Instant | None = Field(None, description="Latest end of the image.")
+    deliver_by: Instant | None = Field(None, description="Latest delivery to the ground.")
 
 
 class StabilityIn(Body):
-    """How dear it is to leave an action of the plan before."""
+    """The value of keeping actions of the previous plan."""
 
     weight: Fraction = Field(
         0.03,
-        description="What keeping a collect counts in the search: a share of a typical reward.",
+        description="Value of keeping a collect, in the search: a share of a typical reward.",
     )
-    contact_weight: Fraction = Field(0.05, description="The same of a contact.")
+    contact_weight: Fraction = Field(0.05, description="The same for a contact.")
     max_changed_share: Fraction | None = Field(
-        None, description="Of the actions after the freeze, the most that may be moved or removed."
+        None, description="Largest share of the actions after the freeze to be moved or removed."
     )
 
 
@@ -42,28 +42,28 @@ class FlownIn(Body):
     outcome: Literal["executed", "failed", "skipped", "partial"] = "executed"
     mbit: NonNegative | None = Field(
         None,
-        description="Taken or brought down; null for what was planned, of what failed nothing.",
+        description="Data recorded or downlinked; null for the planned amount (0 if it failed).",
     )
 
 
 class ReplanOfFile(Body):
-    """The plan that a scenario's plans go on from."""
+    """The previous plan that a scenario's plans continue."""
 
     base: list[PinnedActionIn] = Field(
         max_length=1_000_000,
-        description="Its actions but for what failed: satellite, target or station, and start.",
+        description="Its actions except failed ones: satellite, target or station, and start.",
     )
     freeze_until: Instant = Field(
-        description="What starts before it stays as it is, and nothing is added there."
+        description="Actions that start before it stay as they are, and none is added there."
     )
     promises: list[PromiseIn] = Field([], max_length=10_000)
     stability: StabilityIn = StabilityIn()
     elements: Literal["same", "newest"] = Field(
-        "same", description="Whether satellites have other elements than in the plan before."
+        "same", description="`newest` if satellites have other elements than in the previous plan."
     )
     flown: list[FlownIn] = Field(
-        [], max_length=1_000_000, description="What lies between the states and the horizon."
+        [], max_length=1_000_000, description="Actions between the states and the horizon."
     )
     before: list[StateIn] = Field(
-        [], max_length=10_000, description="Older states, which tell what is on board."
+        [], max_length=10_000, description="Older states, from which follows what is on board."
     )

@@ -1,4 +1,4 @@
-"""What tells two plans apart."""
+"""The difference between two plans."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ class PlannedOut(Wire):
     satellite_name: str | None = None
     mode: Open[PinnedMode]
     target_id: str | None
-    target_name: str | None = Field(None, description="Of a collect whose target has one.")
+    target_name: str | None = Field(None, description="For a collect whose target has a name.")
     station_id: str | None
-    station_name: str | None = Field(None, description="Of a contact.")
+    station_name: str | None = Field(None, description="Only for a contact.")
     start: Instant
     end: Instant
 
 
 class MovedOut(Wire):
-    """The same target, or the same satellite's contact of a station, at another time."""
+    """An action at another time: the same target, or the same satellite and station."""
 
     before: PlannedOut
     after: PlannedOut
 
 
 class TotalDiff(Wire):
-    """A figure of both plans, which differs; null where there is none."""
+    """A figure that differs between the plans; null if a plan has none."""
 
     before: float | None
     after: float | None
-    delta: float | None = Field(description="After less before; null where one is missing.")
+    delta: float | None = Field(description="`after` minus `before`; null if one is missing.")
 
 
 class DiffOut(Wire):
-    """From the first job's plan to the second's; nothing of it for the same plan."""
+    """Changes from the first job's plan to the second's; empty if the plans are the same."""
 
     before: str = Field(description="The first job.")
-    after: str = Field(description="The second one.")
+    after: str = Field(description="The second job.")
     is_empty: bool = Field(description="Whether actions and totals are the same.")
     questions_differ_in: tuple[Open[Difference], ...] = Field(
-        description="Where the jobs did not plan the same: `scenario` with anything else that is "
-        "listed, or alone where pins, settings or targets differ."
+        description="How the jobs' questions differ: `scenario` together with every other entry, "
+        "or alone if pins, settings or targets differ."
     )
     added: tuple[PlannedOut, ...]
     removed: tuple[PlannedOut, ...]
     moved: tuple[MovedOut, ...]
     totals: dict[str, TotalDiff] = Field(
         description="`reward`, `collects`, `contacts`, `targets` (imaged and counted), "
-        "`delivered`, `age_mean_s`, what is downlinked, the lowest battery and the fullest "
-        "recorder; only those that differ."
+        "`delivered`, `age_mean_s`, the data downlinked, the lowest battery level and the highest "
+        "recorder level; only those that differ."
     )

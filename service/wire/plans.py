@@ -1,4 +1,4 @@
-"""Plans with a life: drafts that are approved, published, superseded or withdrawn."""
+"""Plans and their life cycle: drafts that are approved, published, superseded or withdrawn."""
 
 from __future__ import annotations
 
@@ -23,43 +23,43 @@ TRANSITIONS: Final[dict[PlanState, tuple[PlanState, ...]]] = {
     "superseded": (),
     "withdrawn": (),
 }
-"""What a caller may ask for; ``superseded`` comes by publishing another plan."""
+"""Transitions that a caller may request; publishing a plan makes others ``superseded``."""
 
 
 class PlanIn(Body):
-    """A job's plan, to be taken into operations."""
+    """A job's plan to take into operations."""
 
     job_id: Id = Field(description="A job that has a timeline.")
     name: Name | None = None
 
 
 class WaiverIn(Body):
-    """A violation that somebody answers for."""
+    """A violation that somebody accepts responsibility for."""
 
     violation: Id = Field(
-        description="Its place in the plan's `violations`, such as `/violations/0`, or a code for "
-        "all with that code.",
+        description="JSON pointer to it in the plan, such as `/violations/0`, or a code for all "
+        "violations with that code.",
     )
     reason: Reason
 
 
 class TransitionIn(Body):
-    """A step in a plan's life."""
+    """A transition of a plan."""
 
     to: Literal["approved", "published", "withdrawn"]
     reason: Reason | None = Field(None, description="Why, for the history.")
     effective_from: Instant | None = Field(
         None,
-        description="Of `published`: from when on the plan is in force; by default from now, but "
-        "not before its horizon.",
+        description="For `published`: when the plan comes into force; by default now, but not "
+        "before its horizon.",
     )
     waivers: list[WaiverIn] = Field(
-        [], max_length=MAX_WAIVERS, description="Of `approved`: for each violation of the plan."
+        [], max_length=MAX_WAIVERS, description="For `approved`: covering each of its violations."
     )
 
 
 class WaiverOut(Wire):
-    """A violation that somebody answered for."""
+    """A violation that somebody accepted responsibility for."""
 
     violation: str
     reason: str
@@ -75,28 +75,28 @@ class PlanSatelliteOut(Wire):
 
 
 class PlanOut(Stored):
-    """A plan as it stands."""
+    """A plan in its present state."""
 
     id: str
     name: str | None
     state: Open[PlanState]
     owner: str
     job_id: str
-    parent_id: str | None = Field(description="The plan that this one changes.")
+    parent_id: str | None = Field(description="The plan that this replan follows.")
     plan_sha256: str
     horizon: HorizonOut
     validity: Open[Validity]
     violations: tuple[ViolationOut, ...] = Field(description="To be waived on approval.")
     satellites: tuple[PlanSatelliteOut, ...]
-    allowed: tuple[Open[PlanState], ...] = Field(description="Where it can go from here.")
+    allowed: tuple[Open[PlanState], ...] = Field(description="States it can be moved to.")
     created_at: Instant
     links: dict[str, str]
 
 
 class PlanActionOut(Wire):
-    """A collect or a contact, and what became of it as far as that was reported."""
+    """A collect or a contact, and its outcome if one was reported."""
 
-    id: str = Field(description="As in the timeline; executions name it.")
+    id: str = Field(description="As in the timeline; execution reports refer to it.")
     satellite_id: str
     satellite_name: str | None
     mode: Open[PinnedMode]
@@ -106,7 +106,7 @@ class PlanActionOut(Wire):
     target_name: str | None
     station_id: str | None
     station_name: str | None
-    outcome: Open[Outcome] | None = Field(description="The last that was reported.")
+    outcome: Open[Outcome] | None = Field(description="The last one reported.")
 
 
 class PlanEventOut(Wire):
@@ -123,17 +123,17 @@ class PlanEventOut(Wire):
 
 
 class ExecutionIn(Body):
-    """What became of one action."""
+    """The outcome of one action."""
 
     action_id: Id
     outcome: Outcome
     at: Instant | None = Field(None, description="When it was done or failed.")
-    mbit: float | None = Field(None, ge=0, le=1e12, description="Megabits taken or brought down.")
+    mbit: float | None = Field(None, ge=0, le=1e12, description="Megabits recorded or downlinked.")
     detail: Reason | None = None
 
 
 class ExecutionOut(Wire):
-    """A report, as it came."""
+    """An execution report, as received."""
 
     id: str
     action_id: str
@@ -147,7 +147,7 @@ class ExecutionOut(Wire):
 
 
 class PlanStateOut(Wire):
-    """Telemetry, as it came."""
+    """Telemetry, as received."""
 
     id: str
     satellite_id: str
@@ -162,19 +162,19 @@ class PlanStateOut(Wire):
 
 
 class StatesReportedOut(Wire):
-    """What was taken down of telemetry."""
+    """The telemetry that was stored."""
 
     states: tuple[PlanStateOut, ...]
 
 
 class ReportedOut(Wire):
-    """What was taken down of a report."""
+    """The execution reports that were stored."""
 
     executions: tuple[ExecutionOut, ...]
 
 
 class PlanChange(Wire):
-    """What an event tells of a plan: enough to decide whether to fetch the rest."""
+    """The data of an event about a plan: enough to decide whether to fetch the rest."""
 
     plan_id: str
     state: Open[PlanState]

@@ -16,33 +16,33 @@ from service.wire.sites import TargetIn
 
 
 class ReplanIn(Body):
-    """What happened to a plan, and how it is to go on. The plan itself stays as it is."""
+    """What happened to a plan, and how to continue. The plan itself does not change."""
 
-    now: Instant | None = Field(None, description="By default the time at the service.")
+    now: Instant | None = Field(None, description="Defaults to the service's clock.")
     freeze_until: Instant | None = Field(
-        None, description="What starts before it is not touched; `now` by default."
+        None, description="Actions that start before it do not change; `now` by default."
     )
-    horizon_end: Instant | None = Field(None, description="That of the plan by default.")
+    horizon_end: Instant | None = Field(None, description="Defaults to that of the plan.")
     outages: list[OutageIn] = Field(
-        [], max_length=1000, description="Of this replan alone; those stored are taken along."
+        [], max_length=1000, description="For this replan only; stored outages apply as well."
     )
     states: list[StateIn] = Field(
         [],
         max_length=10_000,
-        description="Telemetry of this replan alone; of what was sent before the newest of each "
-        "satellite is taken along. With any, or where a report says that something failed, the "
-        "new plan begins at `now`.",
+        description="Telemetry for this replan only; the newest state of each satellite that was "
+        "sent before applies as well. With any state, or a report of a failed or partial action "
+        "or with `mbit`, the new plan begins at `now`.",
     )
     elements: Literal["same", "newest"] = Field(
         "same",
-        description="`newest`: the elements of each satellite that are in force today. What is "
-        "frozen stays at its instants; what comes later is matched to the accesses of now.",
+        description="`newest`: use the elements of each satellite that are in force today. Frozen "
+        "actions keep their times; later ones are matched to the new accesses.",
     )
     executions: list[ExecutionIn] = Field(
-        [], max_length=MAX_REPORTED, description="Reports to take down first, as by `executions`."
+        [], max_length=MAX_REPORTED, description="Reports to store first, as `executions` does."
     )
     promises: list[PromiseIn] = Field(
-        [], max_length=10_000, description="Those of the plan itself stay as well."
+        [], max_length=10_000, description="Promises of the plan itself remain as well."
     )
     add_targets: list[TargetIn] = Field([], max_length=10_000)
     add_target_catalog_ids: list[Id] = Field([], max_length=1000)
@@ -51,21 +51,21 @@ class ReplanIn(Body):
         [],
         max_length=10_000,
         description="Actions that the new plan must hold, as in `pins.keep`. "
-        "Those of the plan itself stay, but for what `skip` names.",
+        "Those of the plan itself remain, except those that `skip` names.",
     )
     skip: list[PinnedActionIn] = Field(
-        [], max_length=10_000, description="Single actions that it may not hold, as in `pins.skip`."
+        [], max_length=10_000, description="Single actions it may not hold, as in `pins.skip`."
     )
     rewards: dict[Id, NonNegative] = Field(
-        {}, max_length=10_000, description="By target: what its image earns from now on."
+        {}, max_length=10_000, description="By target: what an image of it earns from now on."
     )
     objective: AnyObjective | None = Field(
-        None, description="What images earn from now on; that of the plan by default."
+        None, description="What images earn from now on; defaults to that of the plan."
     )
     stability: StabilityIn = StabilityIn()
-    name: Name | None = Field(None, description="Of the new plan.")
-    solver: Id = Field("certified", description="Which search proves how good the plan is.")
-    params: Free[dict[str, Any]] = Field({}, description="That solver's own.")
+    name: Name | None = Field(None, description="Name of the new plan.")
+    solver: Id = Field("certified", description="Searches for a better plan, and for a bound.")
+    params: Free[dict[str, Any]] = Field({}, description="Parameters of that solver.")
     seed: int = Field(0, ge=0, lt=2**63)
     limits: LimitsIn = LimitsIn()
     priority: int = Field(9, ge=0, le=9, description="9 is the most urgent.")
@@ -73,15 +73,15 @@ class ReplanIn(Body):
 
 
 class PlanChangeItem(Wire):
-    """One action that differs from the plan before."""
+    """One action that differs from the previous plan."""
 
     change: Open[Literal["removed", "moved", "added"]]
-    action: PlanActionOut | None = Field(description="As it is now; null where it is removed.")
-    parent_action: PlanActionOut | None = Field(description="As it was; null where it is new.")
+    action: PlanActionOut | None = Field(description="As it is now; null if it was removed.")
+    parent_action: PlanActionOut | None = Field(description="As it was; null if it is new.")
     cause: Open[Literal["lost", "displaced_by", "resource", "gain"]] = Field(
-        description="`lost`: an outage or a failure took it, or its target was dropped. "
-        "`displaced_by`: another action took its time. `resource`: for battery, recorder or an "
-        "antenna. `gain`: for what it earns."
+        description="`lost`: an outage or a failure ruled it out, or its target was dropped. "
+        "`displaced_by`: another action took its time. `resource`: because of battery, recorder "
+        "or an antenna. `gain`: because of what it earns."
     )
     because_of: tuple[str, ...] = Field(
         description="Ids of the new plan's actions that took its time."
@@ -89,12 +89,12 @@ class PlanChangeItem(Wire):
 
 
 class PlanChangesOut(Wire):
-    """What a replan has changed after its freeze."""
+    """The changes that a replan makes after its freeze."""
 
-    parent_id: str | None = Field(description="Null where the plan is no replan.")
+    parent_id: str | None = Field(description="Null if the plan is not a replan.")
     freeze_until: Instant | None
     changed_share: float = Field(
-        description="Of the parent's actions after the freeze: moved or removed."
+        description="Share of the parent's actions after the freeze that were moved or removed."
     )
-    forced_share: float = Field(description="Of the same: lost whatever is planned.")
+    forced_share: float = Field(description="Share of the same actions: lost in any plan.")
     items: tuple[PlanChangeItem, ...]

@@ -1,4 +1,4 @@
-"""Satellites: how they turn, what they see, their resources and orbits."""
+"""Satellites: their agility, sensors, resources and orbits."""
 
 from __future__ import annotations
 
@@ -42,33 +42,34 @@ OrbitDirection = Literal["ascending", "descending", "any"]
 
 
 class AgilityIn(Body):
-    """How fast the satellite turns; the paper's 1 deg/s by default."""
+    """How fast the satellite slews; the paper's 1 deg/s by default."""
 
     slew_rate_deg_s: Positive = 1.0
     acceleration_deg_s2: Positive | None = Field(
-        None, description="Limit of acceleration and braking; null for none."
+        None, description="Limit of acceleration and braking; null for no limit."
     )
     settle_s: NonNegative = Field(0.0, description="Wait after each slew.")
     slew_model: SlewModel = Field(
         "rest",
-        description="rest: turns begin and end at rest. moving: at the rates at which lines of "
-        "sight move, which needs acceleration_deg_s2.",
+        description="rest: slews begin and end at rest. moving: they begin and end at the rates "
+        "of the moving lines of sight; needs acceleration_deg_s2.",
     )
     sun_exclusion_deg: SunExclusion = Field(
-        None, description="Least angle between boresight and sun in turns, which a flight checks."
+        None,
+        description="Least angle from boresight to sun in slews; not considered in planning.",
     )
 
 
 class LightIn(Body):
-    """When and from where an image may be taken: limits that sensor and target both have."""
+    """Limits on light and viewing direction, which sensors and targets both have."""
 
-    look_side: Open[LookSide] = Field("any", description="Of the direction of flight.")
+    look_side: Open[LookSide] = Field("any", description="Relative to the direction of flight.")
     sun_elevation_min_deg: SunElevation = Field(None, description="Of the sun at the target.")
     sun_elevation_max_deg: SunElevation = Field(None, description="Of the sun at the target.")
     local_time_from_h: LocalTime = Field(
         None,
-        description="Local apparent solar time at the target, in hours from midnight; with "
-        "local_time_to_h. A span from 22 to 2 runs over midnight.",
+        description="Local apparent solar time at the target, in hours from midnight; needs "
+        "local_time_to_h. A span from 22 to 2 includes midnight.",
     )
     local_time_to_h: LocalTime = None
     orbit_direction: Open[OrbitDirection] = Field(
@@ -90,7 +91,7 @@ class SensorIn(LightIn):
     )
     sensor_type: SensorType | None = Field(
         None,
-        description="A name of your own, such as visible or infrared, that targets may ask for.",
+        description="A name of your own, such as visible or infrared, that targets may require.",
     )
 
 
@@ -101,30 +102,30 @@ class ResourcesIn(Body):
     battery_min_fraction: Fraction = 0.3
     initial_battery_fraction: Fraction = 1.0
     sunpoint_power_w: NonNegative = Field(
-        description="Charge while sun-pointing, before idle_power_w."
+        description="Charging power while sun-pointing, before idle_power_w is subtracted."
     )
     idle_power_w: NonNegative = Field(
-        0.0, description="Drawn at all times, in shadow too; the modes' powers come on top of it."
+        0.0, description="Drawn at all times, in eclipse too, in addition to each mode's power."
     )
     collect_power_w: NonNegative = Field(description="Net draw during a collect.")
     contact_power_w: NonNegative = Field(description="Net draw during a contact.")
     recorder_capacity_mbit: Positive
     recorder_max_fraction: Fraction = 0.75
     initial_recorder_fraction: Fraction = 0.0
-    collect_rate_mbit_s: NonNegative = Field(description="What a collect writes.")
+    collect_rate_mbit_s: NonNegative = Field(description="Data that a collect writes.")
     downlink_rate_mbit_s: DownlinkRate = Field(
-        description="What a contact takes down: a number, or knots [elevation_deg, mbit_s] by the "
-        "elevation at the station, ascending, linear between them and constant beyond."
+        description="Downlink rate of a contact: a number, or knots [elevation_deg, mbit_s] in "
+        "ascending elevation at the station, linear between them and constant beyond."
     )
-    telemetry_rate_mbit_s: NonNegative = Field(description="What telemetry writes at all times.")
+    telemetry_rate_mbit_s: NonNegative = Field(description="Telemetry, written at all times.")
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
     sun_pointing: SunPointing = Field(
         "free",
-        description="free: charges in all idle time. slew: only between a turn to the sun and one "
-        "back.",
+        description="free: the satellite charges in all idle time. slew: only between a slew to "
+        "the sun and one back.",
     )
     panel_angle_deg: PanelAngle = Field(
-        180.0, description="Between the normal of the panels and the boresight."
+        180.0, description="Angle between the normal of the panels and the boresight."
     )
 
 
@@ -132,7 +133,7 @@ Preset = Literal["paper", "paper_code"]
 
 
 class PresetResourcesIn(Body):
-    """A preset with other fractions than its own."""
+    """A preset with some settings changed."""
 
     preset: Preset
     battery_min_fraction: Fraction = 0.3
@@ -142,11 +143,11 @@ class PresetResourcesIn(Body):
     eclipse_aware: bool = Field(False, description="Charge only in sunlight.")
     sun_pointing: SunPointing = Field(
         "free",
-        description="free: charges in all idle time. slew: only between a turn to the sun and one "
-        "back.",
+        description="free: the satellite charges in all idle time. slew: only between a slew to "
+        "the sun and one back.",
     )
     panel_angle_deg: PanelAngle = Field(
-        180.0, description="Between the normal of the panels and the boresight."
+        180.0, description="Angle between the normal of the panels and the boresight."
     )
 
 
@@ -157,7 +158,7 @@ def _form_of_resources(value: object) -> str:
 
 
 def _shortest(resources: R) -> R | Preset:
-    """Return a preset that changes nothing by its name alone: one question has one hash."""
+    """Replace an unchanged preset by its name, so that equal questions have equal hashes."""
     if not isinstance(resources, PresetResourcesIn):
         return resources
     plain = PresetResourcesIn(preset=resources.preset)
@@ -201,7 +202,7 @@ class OrbitIn(Body):
 
 
 class OwnResources(Body):
-    """Battery and recorder as far as they differ from those of the spacecraft type."""
+    """Figures of battery and recorder that differ from those of the spacecraft type."""
 
     battery_capacity_wh: Positive | None = None
     battery_min_fraction: Fraction | None = None
@@ -225,7 +226,7 @@ OwnResourcesField = PresetOr[OwnResources]
 
 
 class Figures(Body):
-    """What a spacecraft can do, as far as it differs from its type."""
+    """Settings of a spacecraft that differ from those of its type."""
 
     agility: AgilityIn = Field(
         default_factory=AgilityIn, description="Settings that differ from those of the type."
@@ -237,13 +238,13 @@ class Figures(Body):
         default_factory=OwnResources,
         description="Figures that differ from those of the type, or a preset: the paper's "
         "normalised spacecraft with the rates of its text (paper) or of the authors' code "
-        '(paper_code); with fractions of your own as {"preset": "paper", '
+        '(paper_code). With your own fractions: {"preset": "paper", '
         '"battery_min_fraction": 0.2}.',
     )
 
 
 def sent_by(body: Figures | Patch) -> Json:
-    """Return what a client has sent, and nothing else."""
+    """Return only the fields that a client has sent, without nulls."""
     sent = body.model_dump(mode="json", exclude_unset=True, exclude={"resources"})
     if "resources" in body.model_fields_set:
         resources = getattr(body, "resources", None)
@@ -254,13 +255,13 @@ def sent_by(body: Figures | Patch) -> Json:
 
 
 class SatelliteIn(OrbitIn, Figures):
-    """A satellite: a type of spacecraft in an orbit, and what is different about it."""
+    """A satellite: a type of spacecraft in an orbit, and the settings that differ."""
 
     name: Name
     spacecraft: Id | None = Field(
         None,
-        description="Id of a spacecraft type, or the name of one that is built in. By default "
-        "generic_optical, or the paper's where `resources` is a preset of the paper.",
+        description="Id of a spacecraft type, or the name of a built-in one. By default "
+        "generic_optical, or the paper's type if `resources` is a preset of the paper.",
     )
 
 
@@ -268,7 +269,7 @@ class TypedFigures(Body):
     """All figures of a spacecraft; those left out are the paper's."""
 
     spacecraft: Id | None = Field(
-        None, description="The type it was made from, id or built-in name."
+        None, description="Id or built-in name of the type it was made from."
     )
     agility: AgilityIn = AgilityIn()
     sensor: SensorIn = SensorIn()
@@ -284,19 +285,19 @@ class WholeSatellite(OrbitIn, TypedFigures):
 
 
 class SatellitePatch(Patch):
-    """What is to be different about a satellite; what is left out or null stays."""
+    """Changes to a satellite; fields that are left out or null stay as they are."""
 
     name: Name | None = None
     spacecraft: Id | None = Field(
-        None, description="Gives it all figures of this type, before what stands beside it."
+        None, description="Sets all figures to those of this type, before the other changes."
     )
     agility: AgilityIn | None = Field(None, description="Only the settings given are changed.")
     sensor: SensorIn | None = Field(None, description="Only the settings given are changed.")
-    resources: ResourcesField | None = Field(None, description="Replaces them as a whole.")
+    resources: ResourcesField | None = Field(None, description="Replaces all resources.")
 
 
 class OemOut(Stored):
-    """An ephemeris: what it is of, when it may be used, and how many states it has."""
+    """An ephemeris: its object, usable time span and number of states."""
 
     object_name: str
     object_id: str
@@ -327,7 +328,7 @@ class SatelliteOut(Stored):
     omm: Json | None
     oem: OemOut | None = None
     spacecraft: str | None = Field(
-        None, description="The type it was made from; its figures stay what they are."
+        None, description="The type it was made from; later changes of the type have no effect."
     )
     agility: AgilityIn
     sensor: SensorIn
@@ -337,7 +338,7 @@ class SatelliteOut(Stored):
 
 
 class RecordWarning(RejectedRow):
-    """What was put right while reading a record."""
+    """A correction made while reading a record."""
 
 
 ImportStatus = Literal["created", "elements_added", "unchanged"]
@@ -352,7 +353,7 @@ class ImportedSatellite(Wire):
     epoch: Instant
     row: int | None = Field(description="Line of the file where the record starts.")
     status: Open[ImportStatus] = Field(
-        description="`elements_added`: the catalogue number was known, the epoch was not; "
-        "`unchanged`: both were."
+        description="`elements_added`: the catalogue number was known, the epoch was new; "
+        "`unchanged`: both were known."
     )
     warnings: tuple[RecordWarning, ...]

@@ -1,4 +1,4 @@
-"""Scenarios: frozen questions, the files they are, and the opportunities they offer."""
+"""Scenarios (frozen planning questions), scenario files, and opportunities."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ Curve = Annotated[list[Knot], Field(max_length=100)]
 
 
 class QualityIn(Body):
-    """What part of its target's reward an image earns: the product of all curves.
+    """The share of its target's reward that an image earns: the product of all curves.
 
-    A curve is a list of knots, an angle and a value from 0 to 1, angles ascending; linear between
-    them and constant beyond. It is read at the middle of the collect.
+    A curve is a list of knots (an angle, and a value from 0 to 1) in ascending order, linear
+    between them and constant beyond. It is evaluated at the middle of the collect.
     """
 
     off_nadir_deg: Curve = Field(
         [],
-        description="Knots [off_nadir_deg, value], from 0 to 90; none for 1 everywhere.",
+        description="Knots [off_nadir_deg, value], from 0 to 90; empty for 1 everywhere.",
         examples=[[[0, 1], [45, 0.6]]],
     )
     sun_elevation_deg: Curve = Field(
         [],
-        description="Knots [sun_elevation_deg, value], at the target, from -90 to 90; none for 1 "
+        description="Knots [sun_elevation_deg, value], at the target, from -90 to 90; empty for 1 "
         "everywhere.",
         examples=[[[10, 0.5], [40, 1]]],
     )
@@ -55,27 +55,26 @@ Preference = Literal["early", "off_nadir", "sun", "balance", "margin", "few_cont
 
 
 class ObjectiveIn(Body):
-    """What a plan earns for an image when it is taken, and what when it is on the ground."""
+    """How much a plan earns for an image when it is taken, and when it is on the ground."""
 
     collected_share: Fraction = Field(
         1.0,
-        description="The part of its worth that an image earns when it is taken. The rest it earns "
-        "when its last bit is on the ground. Without resources images earn all when taken.",
+        description="Share of its worth that an image earns when it is taken; it earns the rest "
+        "when its last bit is on the ground. Without resources, images earn all when taken.",
     )
     half_life_s: float | None = Field(
         None,
         gt=0.0,
-        description="The rest halves with every such time between the end of the collect and its "
-        "last bit on the ground; null for no decay. With a `collected_share` of 1 nothing is left "
-        "to halve.",
+        description="Half-life of the rest, from the end of the collect until its last bit is on "
+        "the ground; null for no decay. It has no effect if `collected_share` is 1.",
     )
     prefer: list[Preference] = Field(
         [],
-        description="Secondary aims, in order, that never cost worth: `early` (least mean age), "
-        "`off_nadir` (least mean angle), `sun` (highest mean sun elevation), `balance` (least "
-        "share of the busiest satellite), `margin` (highest lowest battery), `few_contacts`. An "
-        "aim may cost those before it a hundredth at most. A replan leaves them aside: it changes "
-        "as little as it must.",
+        description="Secondary aims, in order, that never cost worth: `early` (lowest mean age), "
+        "`off_nadir` (smallest mean angle), `sun` (highest mean sun elevation), `balance` "
+        "(smallest share of the busiest satellite), `margin` (highest minimum battery level), "
+        "`few_contacts`. An aim may worsen those before it by at most a hundredth. A replan "
+        "ignores them, as it changes as little as it must.",
     )
 
 
@@ -95,9 +94,9 @@ def _objective_named(value: object) -> object:
 
 
 class _OrShortName:
-    """Shows the short names in the schema of what is sent and of what is answered alike.
+    """Shows the short names in the schemas of requests and answers alike.
 
-    Two schemas of one thing would give it two names, and generated clients would lose both.
+    Two schemas of one model would get two names, and generated clients would lose both.
     """
 
     def __get_pydantic_json_schema__(
@@ -111,7 +110,7 @@ AnyObjective = Annotated[ObjectiveIn, BeforeValidator(_objective_named), _OrShor
 
 
 def default_objective(types: Iterable[object]) -> ObjectiveIn:
-    """Return what a new question earns that does not say it, by the types of its satellites."""
+    """Return the default objective of a new question, given the types of its satellites."""
     is_of_paper = all(name in ("paper", "paper_code") for name in types)
     return ObjectiveIn() if is_of_paper else DEFAULT_OBJECTIVE
 
@@ -121,76 +120,76 @@ def _without_default(schema: JsonSchemaValue) -> None:
 
 
 class Question(Body):
-    """What scenarios and scenario files share."""
+    """Fields that scenarios and scenario files share."""
 
     name: Name | None = None
     horizon: HorizonIn
     use_resources: bool = Field(
-        True, description="False: no contacts, no sun-pointing, no battery and recorder limits."
+        True, description="False: no contacts, no sun-pointing, no battery or recorder limits."
     )
     dynamics: Open[Dynamics] = Field(
-        "physical", description="How battery and recorder are integrated."
+        "physical", description="How battery and recorder levels are integrated."
     )
     collect_spacing_s: Duration | None = Field(
-        None, description="Several collects per access, this far apart; null for one, centred."
+        None, description="Interval between an access's collects; null for a single, centred one."
     )
     collect_alignment: Open[CollectAlignment] = Field(
         "access",
-        description="Whether those start from each access's own start on, or at multiples of "
-        "collect_spacing_s from the horizon's start.",
+        description="Whether the collects are counted from the start of each access, or start at "
+        "multiples of collect_spacing_s from the horizon's start.",
     )
     continuous_starts: bool = Field(
         False,
-        description="A solver may place a collect anywhere inside its access; not with `quality`.",
+        description="Whether collects may start at any time in their access; not with `quality`.",
     )
     quality: QualityIn = QualityIn()
     objective: AnyObjective = Field(
         ObjectiveIn(),
-        description="What a plan is to earn. `collected` is short for a collected_share of 1, "
-        "`delivered` for 0; `paper` is the same as `collected`. Left out, it is a collected_share "
-        "of 0.9 with `early` and `off_nadir` preferred; `paper` where all satellites are of the "
+        description="What images earn. `collected` is short for a collected_share of 1, "
+        "`delivered` for 0; `paper` is the same as `collected`. The default is a collected_share "
+        "of 0.9 with `early` and `off_nadir` preferred; it is `paper` if all satellites are of the "
         "types `paper` and `paper_code`, and in files of the first release.",
-        # What it is by default hangs on the satellites.
+        # The default depends on the satellites.
         json_schema_extra=_without_default,
     )
     allow_old_elements: bool = Field(
         False,
-        description="Plan with element sets that are more than 30 days from their epoch "
-        "(low orbits), which is refused otherwise.",
+        description="Accept element sets that are more than 30 days from their epoch "
+        "(in low orbits), which are otherwise refused.",
     )
     pins: PinsIn = PinsIn()
     outages: list[PlacedOutage] = Field(
         [],
         max_length=10_000,
-        description="What is known to be out, and when. Those stored under `/v1/outages` that "
-        "concern the scenario are added when it is stored.",
+        description="Known outages. Those stored under `/v1/outages` that concern the scenario "
+        "are added when it is stored.",
     )
     states: list[StateIn] = Field(
         [],
         max_length=10_000,
         description="Battery, recorder and attitude of satellites before the horizon begins, at "
-        "most one state of each. Without, their `resources` say what they have at its start.",
+        "most one state each. Without one, `resources` give the levels at the horizon's start.",
     )
 
 
 class ScenarioIn(Question):
-    """A planning question over what is stored."""
+    """A planning question about stored satellites, targets and stations."""
 
     satellite_ids: list[Id] = Field(min_length=1, max_length=10_000)
     target_catalog_ids: list[Id] = Field(min_length=1, max_length=1000)
     ground_station_ids: list[Id] = Field([], max_length=10_000)
     forecast_id: Id | None = Field(
-        None, description="What it says of the targets is frozen with the scenario."
+        None, description="Its values for the targets are frozen with the scenario."
     )
 
 
 class FileSatellite(WholeSatellite):
     """A satellite of a scenario file.
 
-    Of a `spacecraft` that is built in, and in files of release 2, it takes what it leaves out.
+    Figures left out are those of its `spacecraft` type, which has a default in files of release 2.
     """
 
-    spacecraft: BuiltIn | None = Field(None, description="A type that is built in.")
+    spacecraft: BuiltIn | None = Field(None, description="A built-in type.")
 
     id: Id | None = Field(None, description="Its name by default, made unique.")
 
@@ -211,16 +210,16 @@ class SkySeriesIn(Body):
         Field(
             min_length=1,
             max_length=1_000_000,
-            description="By id of the target, one for each of `times`.",
+            description="By target id: one value for each of `times`.",
         )
     )
 
 
 class FileForecast(Body):
-    """What a forecast says of the targets, frozen with the question."""
+    """The values of a forecast for the targets, frozen with the question."""
 
     default_clear_probability: float | None = Field(
-        None, ge=0, le=1, description="Of targets and instants that no series covers."
+        None, ge=0, le=1, description="For targets and instants that no series covers."
     )
     series: Annotated[list[SkySeriesIn], FailFast()] = Field([], max_length=1_000_000)
 
@@ -232,26 +231,26 @@ class FileTarget(TargetIn):
 
 
 class ScenarioFile(Question):
-    """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` answers it."""
+    """A self-contained scenario, as ``GET /v1/scenarios/{id}?expand=true`` returns it."""
 
     release: Literal[1, 2] = Field(
         1,
-        description="Of the file's form. In files of the first release satellites have the paper's "
-        "figures where they leave them out, from the second on those of `generic_optical`.",
+        description="Version of the file's form. Figures left out by satellites without a type are "
+        "the paper's in files of release 1, and those of `generic_optical` in files of release 2.",
     )
-    # The first thing that is wrong is told: of a whole file of them each would take memory.
+    # Only the first error is reported: in a large file, all of them would take too much memory.
     satellites: Annotated[list[FileSatellite], FailFast()] = Field(min_length=1, max_length=10_000)
     targets: Annotated[list[FileTarget], FailFast()] = Field(min_length=1, max_length=1_000_000)
     ground_stations: Annotated[list[FileGroundStation], FailFast()] = Field([], max_length=10_000)
-    forecast: FileForecast | None = Field(None, description="Null to take every sky for clear.")
+    forecast: FileForecast | None = Field(None, description="Null to assume clear skies.")
     replan: ReplanOfFile | None = Field(
-        None, description="The plan that this one goes on from, as a replan makes it."
+        None, description="The previous plan that this one continues, as a replan writes it."
     )
 
     @model_validator(mode="before")
     @classmethod
     def _with_types(cls, value: object) -> object:
-        """Give satellites the figures of their types; what is no such file is told later."""
+        """Give satellites the figures of their types; malformed files are reported later."""
         if not isinstance(value, dict) or not isinstance(value.get("satellites"), list):
             return value
         satellites = [
@@ -274,7 +273,7 @@ class HorizonOut(Wire):
 
 
 class Counts(Wire):
-    """How much the scenario holds."""
+    """Numbers of objects in the scenario."""
 
     satellites: int
     targets: int
@@ -282,10 +281,10 @@ class Counts(Wire):
 
 
 class ScenarioSummary(Stored):
-    """A frozen question without its pins, as lists have it."""
+    """A frozen question without its pins, outages and states, as in lists."""
 
     id: str
-    sha256: str = Field(description="Of the canonical content, the name left out.")
+    sha256: str = Field(description="Hash of the canonical content without the name.")
     name: str | None
     horizon: HorizonOut
     satellite_ids: tuple[str, ...]
@@ -300,29 +299,29 @@ class ScenarioSummary(Stored):
     objective: ObjectiveIn = ObjectiveIn()
     allow_old_elements: bool
     forecast_id: str | None = Field(
-        None, description="Where clear skies came from; null where the file had them, or none."
+        None, description="The forecast used; null if the file held one, or there is none."
     )
     has_forecast: bool = False
     counts: Counts
     warnings: tuple[str, ...] = Field(
-        description="About old orbits and what is nearly always a mistake, for people."
+        description="For people: old orbits, and settings that are nearly always a mistake."
     )
     created_at: Instant
     links: dict[str, str]
 
 
 class ScenarioOut(ScenarioSummary):
-    """A frozen question. Later edits of what it names change nothing in it."""
+    """A frozen question. Later changes to the objects it names do not affect it."""
 
     pins: PinsIn = PinsIn()
     outages: tuple[PlacedOutage, ...] = Field(
-        (), description="With the `id` of each that was taken from `/v1/outages`."
+        (), description="Those taken from `/v1/outages` have their `id`."
     )
-    states: tuple[StateIn, ...] = Field((), description="What satellites had before the horizon.")
+    states: tuple[StateIn, ...] = Field((), description="States before the horizon.")
 
 
 class ViewOut(Wire):
-    """What satellite and place see of each other at one instant."""
+    """The geometry between a satellite and a site at one instant."""
 
     off_nadir_deg: float
     elevation_deg: float
@@ -333,28 +332,28 @@ class ViewOut(Wire):
 
 
 class OpportunityOut(Wire):
-    """A collect or a contact that a plan may take. Angles and range hold at its middle."""
+    """A collect or a contact that a plan may take. Angles and range are those at its middle."""
 
     id: str
     satellite_id: str
     satellite_name: str | None = None
     kind: Open[Kind]
-    target_id: str | None = Field(description="Of a collect.")
-    target_name: str | None = Field(None, description="Of a collect whose target has one.")
-    station_id: str | None = Field(description="Of a contact.")
-    station_name: str | None = Field(None, description="Of a contact.")
+    target_id: str | None = Field(description="Only for a collect.")
+    target_name: str | None = Field(None, description="For a collect whose target has a name.")
+    station_id: str | None = Field(description="Only for a contact.")
+    station_name: str | None = Field(None, description="Only for a contact.")
     start: Instant
     end: Instant
     access_start: Instant = Field(
-        description="The opportunity lies within its access, cut to the release and due times."
+        description="Start of the access that it lies in, cut to the release and due times."
     )
     access_end: Instant
-    off_nadir_deg: float = Field(description="At the satellite, from the nadir named below.")
+    off_nadir_deg: float = Field(description="At the satellite, from the nadir given by `nadir`.")
     elevation_deg: float = Field(description="At the target or station.")
-    azimuth_deg: float = Field(description="Of the satellite, from north over east.")
+    azimuth_deg: float = Field(description="Of the satellite, from north through east.")
     sun_elevation_deg: float = Field(description="At the target or station.")
     range_km: float = Field(description="From the satellite to the target or station.")
     eclipse: bool = Field(description="The satellite is in the Earth's shadow.")
-    nadir: Open[Nadir] = Field(description="What off-nadir angles are measured from.")
-    at_start: ViewOut | None = Field(None, description="With `edges=true`.")
-    at_end: ViewOut | None = Field(None, description="With `edges=true`.")
+    nadir: Open[Nadir] = Field(description="Vertical that off-nadir angles are measured from.")
+    at_start: ViewOut | None = Field(None, description="Only with `edges=true`.")
+    at_end: ViewOut | None = Field(None, description="Only with `edges=true`.")

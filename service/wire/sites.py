@@ -1,4 +1,4 @@
-"""Places on the ground: targets in their catalogues, and ground stations."""
+"""Sites on the ground: targets in their catalogues, and ground stations."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from service.wire.satellites import LightIn, SensorType
 
 Latitude = Annotated[float, Field(ge=-90, le=90, description="Geodetic (WGS84), north positive.")]
 Longitude = Annotated[
-    float, Field(ge=-180, le=360, description="East positive; both 190 and -170 are taken.")
+    float, Field(ge=-180, le=360, description="East positive; 190 and -170 mean the same.")
 ]
 Mask = Annotated[list[Knot], Field(max_length=720)]
 Altitude = Annotated[float, Field(ge=-500, le=10000, description="Above the WGS84 ellipsoid.")]
@@ -42,16 +42,16 @@ class GroundStationIn(Body):
     lon_deg: Longitude
     alt_m: Altitude = 0.0
     min_elevation_deg: float = Field(5.0, ge=0, lt=90)
-    min_contact_s: NonNegative = Field(0.0, description="Shorter passes are no contacts.")
+    min_contact_s: NonNegative = Field(0.0, description="Shorter passes are not used.")
     elevation_mask: Mask = Field(
         [],
-        description="Knots [azimuth_deg, elevation_deg] of the horizon, azimuth ascending from "
-        "north over east, linear between them and round the compass. The higher of mask and "
-        "min_elevation_deg holds.",
+        description="Knots [azimuth_deg, elevation_deg] of the local horizon, azimuth ascending "
+        "from north through east, linear between knots and from the last to the first. The higher "
+        "of mask and min_elevation_deg applies.",
     )
-    antennas: int = Field(1, ge=1, le=100, description="Satellites served at a time.")
+    antennas: int = Field(1, ge=1, le=100, description="Number of satellites served at a time.")
     setup_s: NonNegative = Field(
-        0.0, description="At the beginning of each contact, in which nothing comes down."
+        0.0, description="Time at the beginning of each contact before data is downlinked."
     )
     downlink_gain: Positive = Field(
         1.0, description="Factor on the downlink_rate_mbit_s of each satellite."
@@ -59,7 +59,7 @@ class GroundStationIn(Body):
 
 
 class GroundStationPatch(Patch):
-    """What is to be different about a ground station; what is left out or null stays."""
+    """Changes to a ground station; fields that are left out or null stay as they are."""
 
     name: Name | None = None
     lat_deg: Latitude | None = None
@@ -67,7 +67,7 @@ class GroundStationPatch(Patch):
     alt_m: Altitude | None = None
     min_elevation_deg: Annotated[float, Field(ge=0, lt=90)] | None = None
     min_contact_s: NonNegative | None = None
-    elevation_mask: Mask | None = Field(None, description="Replaces the mask as a whole.")
+    elevation_mask: Mask | None = Field(None, description="Replaces the whole mask.")
     antennas: Annotated[int, Field(ge=1, le=100)] | None = None
     setup_s: NonNegative | None = None
     downlink_gain: Positive | None = None
@@ -87,8 +87,8 @@ class ImportedStation(Wire):
     name: str
     row: int | None = Field(description="Line of the file, for CSV.")
     status: Open[Literal["created", "updated", "unchanged"]] = Field(
-        description="`updated`: the only station of this name has other figures now; "
-        "`unchanged`: the same station is stored already."
+        description="`updated`: the only station of this name was given new figures; "
+        "`unchanged`: the same station is already stored."
     )
 
 
@@ -98,7 +98,7 @@ class TargetIn(LightIn):
     Its limits narrow those of the sensor: a collect meets both.
     """
 
-    id: Id = Field(description="Your own; unique in the catalogue.")
+    id: Id = Field(description="Your own id, unique in the catalogue.")
     name: Name | None = None
     lat_deg: Latitude
     lon_deg: Longitude
@@ -114,12 +114,12 @@ class TargetIn(LightIn):
     due: Instant | None = Field(None, description="No collect of it ends later.")
     sensor_type: SensorType | None = Field(
         None,
-        description="Only satellites whose sensor has this very type collect it; null for any.",
+        description="Only satellites whose sensor has exactly this type collect it; null for any.",
     )
     reward_half_life_s: Duration | None = Field(
         None,
-        description="The reward halves with every such time between `release`, or the horizon's "
-        "start, and the start of the collect; null where it does not fall.",
+        description="Half-life of the reward, from `release` or the horizon's start to the start "
+        "of the collect; null for a constant reward.",
     )
 
 
@@ -131,30 +131,28 @@ class TargetCatalogIn(Body):
 
 
 class TargetCatalogPatch(Patch):
-    """What is to be different about a catalogue; what is left out or null stays."""
+    """Changes to a catalogue; fields that are left out or null stay as they are."""
 
     name: Name | None = None
     rewards: dict[Id, NonNegative] | None = Field(
         None,
         max_length=MAX_TARGETS,
-        description="By target, its priority: what its image earns from now on.",
+        description="New rewards by target id: what an image of the target earns from now on.",
     )
 
 
 class TargetCatalogOut(Stored):
-    """A catalogue; its targets have their own address."""
+    """A catalogue; its targets have an address of their own."""
 
     id: str
     name: str
     num_targets: int
     created_at: Instant
-    changed_at: Instant | None = Field(None, description="When name or rewards were changed last.")
+    changed_at: Instant | None = Field(None, description="When name or rewards last changed.")
     links: dict[str, str]
 
 
 class CreatedCatalog(TargetCatalogOut):
     """A new catalogue."""
 
-    ignored_columns: tuple[str, ...] = Field(
-        description="Columns of a CSV file that mean nothing here."
-    )
+    ignored_columns: tuple[str, ...] = Field(description="Columns of a CSV file that were ignored.")

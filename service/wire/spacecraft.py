@@ -9,13 +9,13 @@ from service.wire.satellites import AgilityIn, Figures, OwnResourcesField, Resou
 
 
 class SpacecraftIn(Figures):
-    """A type of spacecraft. What it leaves out is that of `generic_optical`, or of its preset."""
+    """A type of spacecraft. Settings left out are those of `generic_optical`, or of its preset."""
 
     name: Name
 
 
 class SpacecraftPatch(Patch):
-    """What is to be different about a type; what is left out or null stays."""
+    """Changes to a type; fields that are left out or null stay as they are."""
 
     name: Name | None = None
     agility: AgilityIn | None = Field(None, description="Only the settings given are changed.")
@@ -37,10 +37,10 @@ class WholeSpacecraft(Body):
 class SpacecraftOut(Stored):
     """A type of spacecraft."""
 
-    id: str = Field(description="Of a type that is built in, its name.")
+    id: str = Field(description="The name, for a built-in type.")
     name: str
     agility: AgilityIn
     sensor: SensorIn
     resources: ResourcesField
-    is_built_in: bool = Field(description="It cannot be changed.")
-    created_at: Instant | None = Field(description="Null for a type that is built in.")
+    is_built_in: bool = Field(description="Built-in types cannot be changed.")
+    created_at: Instant | None = Field(description="Null for a built-in type.")

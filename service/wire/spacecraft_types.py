@@ -1,7 +1,7 @@
-"""Spacecraft types that are built in, as data, and how a body without all figures is filled up.
+"""Built-in spacecraft types, as data, and how a body takes missing figures from a type.
 
-Where each figure comes from stands in docs/spacecraft.md. Figures are those of a class of
-spacecraft, not of one of them.
+docs/spacecraft.md gives the source of each figure. The figures are those of a class of
+spacecraft, not of a particular one.
 """
 
 from __future__ import annotations
@@ -94,13 +94,13 @@ BUILT_IN: Final[Mapping[str, Json]] = MappingProxyType(
         "paper_code": {"agility": {}, "sensor": {}, "resources": "paper_code"},
     }
 )
-"""By name: agility, sensor and resources. What the paper's leave out has its own defaults."""
+"""Agility, sensor and resources by type name. The paper's types leave out what is default."""
 
 _PARTS: Final = ("agility", "sensor", "resources")
 
 
 def type_named_by(given: Mapping[str, Any]) -> str:
-    """Return the type that a satellite's body asks for, by name or else by its preset.
+    """Return the type of a satellite's body: the one it names, else its preset's, else the default.
 
     >>> type_named_by({"resources": {"preset": "paper_code"}}), type_named_by({})
     ('paper_code', 'generic_optical')
@@ -114,10 +114,10 @@ def type_named_by(given: Mapping[str, Any]) -> str:
 
 
 def filled(given: Mapping[str, Any], kind: Mapping[str, Any]) -> Json:
-    """Return a body with what it leaves out taken from a type, setting by setting.
+    """Return a body with missing settings taken from a type, one by one.
 
-    A preset of resources stands for itself, and so do own resources where the type has a preset.
-    Without an acceleration turns go from rest to rest, unless the body says otherwise.
+    A body's resources replace those of the type as a whole if either is a preset.
+    Without an acceleration, slews go from rest to rest unless the body says otherwise.
     """
     agility = {**kind["agility"], **_part(given, "agility")}
     if agility.get("acceleration_deg_s2") is None and "slew_model" not in _part(given, "agility"):
@@ -140,10 +140,10 @@ def _part(given: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def filled_file_satellite(given: Mapping[str, Any], release: object) -> Json:
-    """Return a satellite of a scenario file with its type's figures in place.
+    """Return a satellite of a scenario file with the figures of its type filled in.
 
-    Files of the first release know no types: what they leave out is the paper's, and so it is in
-    the canonical form, which leaves out what questions of the first release did not say.
+    Files of the first release have no types: figures they leave out are the paper's. The same
+    holds for the canonical form, which omits what questions of the first release did not say.
     """
     named = given.get("spacecraft")
     if named is None and release != 2:

@@ -1,4 +1,4 @@
-"""What is stored, read back as it was taken in: an earlier release may have allowed more."""
+"""Reading stored values back unchanged: an earlier release may have allowed a wider range."""
 
 from __future__ import annotations
 
@@ -11,20 +11,19 @@ from pydantic import BaseModel, ValidationError
 M = TypeVar("M", bound=BaseModel)
 
 _BOUNDS: Final = {"greater_than_equal": "ge", "less_than_equal": "le"}
-"""Kinds of errors that a value within its range does not make, and where the range stands."""
+"""Range errors of Pydantic, each with the name of the limit in the error's context."""
 _PLAIN_TEXT: Final = "stored"
 
 
 def from_store(model: type[M], values: Mapping[str, Any]) -> M:
-    """Return stored values as their model, those out of today's ranges as they are.
+    """Return stored values as their model, keeping those out of today's ranges.
 
-    A value that is out of its range (or a text with characters that are refused today) is kept.
-    Everything else has to fit, as everywhere.
+    A text with characters that are refused today is kept as well. Everything else must be valid.
 
     Raises
     ------
     ValidationError
-        Where more is wrong than that.
+        If anything else is wrong.
     """
     try:
         return model.model_validate(values)
@@ -33,7 +32,7 @@ def from_store(model: type[M], values: Mapping[str, Any]) -> M:
 
 
 def from_row(model: type[M], row: object, /, **more: object) -> M:
-    """Return a row in a shape: what it has under the names of the shape's fields, and ``more``."""
+    """Return a model of the row's attributes that are named like its fields, and of ``more``."""
     names = [name for name in model.model_fields if name not in more and hasattr(row, name)]
     return from_store(model, {name: getattr(row, name) for name in names} | more)
 
@@ -41,7 +40,7 @@ def from_row(model: type[M], row: object, /, **more: object) -> M:
 def beyond_ranges(
     validate: Callable[[Any], M], values: Mapping[str, Any], error: ValidationError
 ) -> M:
-    """Return as a model what was refused for its ranges alone; raise the error otherwise."""
+    """Return values refused only for their ranges as a model; raise the error otherwise."""
     faults = error.errors(include_url=False)
     if any(_stand_in(each) is None for each in faults):
         raise error
@@ -55,7 +54,7 @@ def beyond_ranges(
 
 
 def _stand_in(error: Any) -> object:
-    """Return a value that would have been taken; None where there is none."""
+    """Return a value that would have been accepted; None if the error is of another kind."""
     if error["type"] == "string_pattern_mismatch":
         return _PLAIN_TEXT
     bound = _BOUNDS.get(error["type"])
@@ -63,7 +62,7 @@ def _stand_in(error: Any) -> object:
 
 
 def _path(values: Any, loc: Sequence[str | int]) -> list[str | int]:
-    """Return the steps that lead to a value; the names of a union's members are none."""
+    """Return the keys that lead to a value, without the names of a union's members."""
     path: list[str | int] = []
     for step in loc:
         if isinstance(values, Mapping) and step not in values:
@@ -74,7 +73,7 @@ def _path(values: Any, loc: Sequence[str | int]) -> list[str | int]:
 
 
 def _put(whole: object, path: Sequence[str | int], value: object) -> object:
-    """Put a value in the place of another, which is returned."""
+    """Replace a value and return the previous one."""
     for step in path[:-1]:
         whole = _inside(whole)[step]
     place, step = _inside(whole), path[-1]
@@ -84,5 +83,5 @@ def _put(whole: object, path: Sequence[str | int], value: object) -> object:
 
 
 def _inside(part: object) -> Any:
-    """Return what holds the fields of a model, as its own freeze does not let them be set."""
+    """Return the mapping that holds a model's fields, as the frozen model does not set them."""
     return part.__dict__ if isinstance(part, BaseModel) else part

@@ -1,4 +1,4 @@
-"""Targets over all plans: what became of each so far."""
+"""Targets across all plans: the state of each so far."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TargetState = Literal["open", "planned", "collected", "delivered", "expired", "c
 
 
 class TargetCollectOut(Wire):
-    """The image that a target's state rests on."""
+    """The image that determines a target's state."""
 
     plan_id: str
     action_id: str
@@ -22,16 +22,16 @@ class TargetCollectOut(Wire):
     satellite_name: str
     start: Instant
     end: Instant
-    outcome: Open[Outcome] | None = Field(description="The last that was reported.")
+    outcome: Open[Outcome] | None = Field(description="The last one reported.")
 
 
 class TargetLifeOut(Wire):
-    """A target of a catalogue, and how far it has come."""
+    """A target of a catalogue, and its state."""
 
     catalog_id: str
     catalog_name: str
     target: TargetIn
     state: Open[TargetState]
     collect: TargetCollectOut | None = Field(
-        description="The image that was taken, or else the next one that a published plan has."
+        description="The image that was taken, or else the next one in a published plan."
     )

@@ -1,4 +1,4 @@
-"""Timelines: a plan as the referee found it, satellite by satellite."""
+"""Timelines: plans as the referee replayed them, by satellite."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Outcome = Literal["downlinked", "collected", "unscheduled", "excluded"]
 
 
 class SolverUsed(Wire):
-    """What made the plan: the same once more gives the same `plan_sha256`."""
+    """The solver that made the plan; with the same settings it gives the same `plan_sha256`."""
 
     name: str
     version: str
@@ -44,61 +44,62 @@ class ViolationOut(Wire):
     satellite_id: str
     satellite_name: str | None = None
     at: Instant
-    needed: float = Field(description="What the rule asks for, in seconds or as a fraction.")
+    needed: float = Field(description="What the rule requires, in seconds or as a fraction.")
     available: float = Field(description="What the plan leaves, in the same unit.")
-    actions: tuple[str, ...] = Field(description="Ids of the actions in question.")
+    actions: tuple[str, ...] = Field(description="Ids of the actions involved.")
     detail: str
     inherited: bool = Field(
         False,
-        description="It held at the start, or what is frozen leads to it; no action that was free "
-        "to be planned has a part in it.",
+        description="Whether it existed at the start or results from frozen actions; no freely "
+        "planned action contributes to it.",
     )
 
 
 class SpreadOut(Wire):
-    """A figure over all images."""
+    """Mean and median of a figure over all images."""
 
     mean: float
     median: float
 
 
 class AgesOut(SpreadOut):
-    """How old images are when their last bit is on the ground, in seconds."""
+    """Ages of images when their last bit is on the ground, in seconds."""
 
-    p90: float = Field(description="Nine of ten are no older.")
+    p90: float = Field(description="90th percentile.")
     max: float
 
 
 class ImageFiguresOut(Wire):
-    """Of the images that earn, one of each target."""
+    """Figures of the images that earn, one of each target."""
 
-    images: int | None = Field(None, description="How many there are.")
+    images: int | None = Field(None, description="Number of these images.")
     expected_clear: float | None = Field(
-        None, description="How many of them are clear on average; null without a forecast."
+        None, description="Expected number of clear ones; null without a forecast."
     )
     night_images: int | None = Field(
-        None, description="Those with the sun below the target's horizon."
+        None, description="Number of those with the sun below the target's horizon."
     )
     off_nadir_deg: SpreadOut | None = Field(
-        None, description="At the middle of each; null where there is none."
+        None, description="At the middle of each image; null if there are none."
     )
-    quality_mean: float | None = Field(None, description="Null where there is none.")
+    quality_mean: float | None = Field(None, description="Null if there are no images.")
 
 
 class PreferredOut(Wire):
-    """What a plan of the same worth was made to be like: before and after."""
+    """A secondary aim, before and after the plan was improved for it at the same worth."""
 
     aim: Open[Preference]
     before: float = Field(
-        description="`early`: mean age in seconds, an image that stays on board as old as the "
-        "horizon; `off_nadir`, `sun`: mean angle in degrees; `balance`: the busiest satellite's "
-        "share of all images; `margin`: lowest battery, as a fraction; `few_contacts`: how many."
+        description="`early`: mean age in seconds, an image that stays on board counting as the "
+        "whole horizon; `off_nadir`, `sun`: mean angle in degrees; `balance`: the busiest "
+        "satellite's share of all images; `margin`: lowest battery level, as a fraction; "
+        "`few_contacts`: number of contacts."
     )
     after: float
 
 
 class TotalsOut(ImageFiguresOut):
-    """The plan in numbers, as the referee found them."""
+    """Totals of the plan, computed by the referee."""
 
     reward: float
     bound: float | None = Field(description="Proven: no plan of the scenario can earn more.")
@@ -109,83 +110,84 @@ class TotalsOut(ImageFiguresOut):
     collects: int
     contacts: int
     targets: dict[Open[Outcome], int] = Field(
-        description="How many came to what; together all of the scenario."
+        description="Number of targets by outcome; together all of the scenario."
     )
     downlinked_mbit: float | None = Field(
-        description="Null where a recorder has no capacity in megabits."
+        description="Null if a recorder has no capacity in megabits."
     )
     downlinked_fraction: float | None = Field(
-        description="In multiples of what the recorders hold."
+        description="Sum over satellites, each in multiples of its recorder's capacity."
     )
-    battery_min_fraction: float | None = Field(description="The lowest charge of any satellite.")
-    recorder_max_fraction: float | None = Field(description="The highest fill of any recorder.")
+    battery_min_fraction: float | None = Field(description="Lowest level of any battery.")
+    recorder_max_fraction: float | None = Field(description="Highest level of any recorder.")
     delivered: int | None = Field(
         None,
-        description="How many of these images are on the ground by the end of the horizon; null "
-        "without resources, as there are no contacts.",
+        description="Number of images on the ground by the end of the horizon; null without "
+        "resources, as there are no contacts.",
     )
     age_s: AgesOut | None = Field(
-        None, description="Of those, from the end of the collect to the last bit on the ground."
+        None,
+        description="Ages of those, from the end of the collect to the last bit on the ground.",
     )
     on_board_mbit_end: float | None = Field(
         None,
-        description="What recorders hold at the end, telemetry included; null where a recorder "
-        "has no capacity in megabits.",
+        description="Data on all recorders at the end, telemetry included; null if a recorder has "
+        "no capacity in megabits.",
     )
     preferred: list[PreferredOut] = Field(
-        [], description="What the objective's `prefer` came to, in its order."
+        [], description="Results for the objective's `prefer`, in its order."
     )
 
 
 class SlewOut(Wire):
-    """The turn before an action."""
+    """The slew before an action."""
 
     angle_deg: float
-    needed_s: float = Field(description="Settling included.")
+    needed_s: float = Field(description="Including settling.")
     available_s: float
 
 
 class ActionOut(Wire):
-    """One thing that a satellite does."""
+    """One action of a satellite."""
 
     id: str
     mode: Open[Mode] = Field(
-        description="In idle time `sunpoint`, at the sun with panels that charge in sunlight, or "
-        "`hold`, where there is no time to turn to it and back."
+        description="Idle time is `sunpoint`, with the panels at the sun, charging in sunlight, "
+        "or `hold`, if there is no time to slew to the sun and back."
     )
     start: Instant
     end: Instant
     target_id: str | None
-    target_name: str | None = Field(None, description="Of a collect whose target has one.")
+    target_name: str | None = Field(None, description="For a collect whose target has a name.")
     station_id: str | None
-    station_name: str | None = Field(None, description="Of a contact.")
+    station_name: str | None = Field(None, description="Only for a contact.")
     opportunity_id: str | None
     off_nadir_deg: float | None = Field(description="At the middle of the action.")
     azimuth_deg: float | None
     slew: SlewOut | None
     turn_to_s: float | None = Field(
-        None, description="Of `sunpoint`: the turn to the sun, which ends at its start."
+        None, description="For `sunpoint`: the slew to the sun, which ends at its start."
     )
     turn_back_s: float | None = Field(
-        None, description="Of `sunpoint`: the turn from the sun, which begins at its end."
+        None, description="For `sunpoint`: the slew from the sun, which begins at its end."
     )
-    reward: float = Field(description="What the plan earns with it.")
+    reward: float = Field(description="What the plan earns by it.")
     worth: float | None = Field(
         None,
-        description="Of a collect: what its image is worth by itself in this plan: the target's "
-        "reward when it starts times quality and clear_probability, and of that what the "
+        description="For a collect: the worth of its image by itself in this plan: the target's "
+        "reward at its start times quality and clear_probability, and of that the part that the "
         "`objective` lets it earn.",
     )
     quality: float | None = Field(
-        None, description="Of a collect: what part of its target's reward its image is worth."
+        None, description="For a collect: the share of its target's reward that its image is worth."
     )
     clear_probability: float | None = Field(
-        None, description="Of a collect: that the sky is clear; null without a forecast."
+        None, description="For a collect: probability of a clear sky; null without a forecast."
     )
     delivered_at: Instant | None = Field(
         None,
-        description="Of a collect: when the last bit of its image is on the ground, first in, "
-        "first out; null for never.",
+        description="For a collect: when the last bit of its image is on the ground (first in, "
+        "first out); null for never.",
     )
     age_s: float | None = Field(None, description="From the end of the collect to that instant.")
     battery_fraction_end: float | None
@@ -193,7 +195,7 @@ class ActionOut(Wire):
 
 
 class ResourceCurvesOut(Wire):
-    """Battery and recorder over time, straight between the instants, with their limits."""
+    """Battery and recorder levels over time, linear between the instants, with their limits."""
 
     time: tuple[Instant, ...]
     battery_fraction: tuple[float, ...]
@@ -203,23 +205,23 @@ class ResourceCurvesOut(Wire):
 
 
 class SatelliteTotalsOut(ImageFiguresOut):
-    """What one satellite has a part in."""
+    """Totals of one satellite."""
 
     reward: float
     collects: int
     contacts: int
-    delivered: int | None = Field(description="As in the totals of all.")
+    delivered: int | None = Field(description="As in the plan's totals.")
     age_s: AgesOut | None
     on_board_mbit_end: float | None
 
 
 class OnBoardOut(Wire):
-    """What became of an image that the recorder held when the horizon began."""
+    """The delivery of an image that the recorder held when the horizon began."""
 
     target_id: str
     collected_at: Instant
     mbit: float | None = Field(
-        description="What was left of it; null where the recorder has no size in megabits."
+        description="Data still to be downlinked; null if the recorder has no size in megabits."
     )
     recorder_fraction: float
     worth: float
@@ -229,13 +231,13 @@ class OnBoardOut(Wire):
 
 
 class SatelliteTimelineOut(Wire):
-    """What one satellite does, in order."""
+    """The actions of one satellite, in order."""
 
     id: str
     name: str
     actions: tuple[ActionOut, ...]
     on_board: tuple[OnBoardOut, ...] = Field(
-        (), description="Images that its recorder held at the start, the first to come down first."
+        (), description="Images that its recorder held at the start, in order of downlink."
     )
     totals: SatelliteTotalsOut | None = None
     eclipses: tuple[HorizonOut, ...] = Field((), description="Spans in the Earth's shadow.")
@@ -246,13 +248,13 @@ class ModelsOut(Wire):
     """The physics behind the accesses."""
 
     propagation: str = "SGP4"
-    gravity: str = Field("WGS72", description="Of the element sets.")
+    gravity: str = Field("WGS72", description="Gravity model of the element sets.")
     earth_orientation: str = "IERS daily dUT1 and polar motion"
     nadir: dict[str, Open[Nadir]] = Field({}, description="By satellite.")
 
 
 class TimelineHead(Wire):
-    """A timeline but for its satellites."""
+    """A timeline without its satellites."""
 
     schema_version: str
     job: str
@@ -265,8 +267,8 @@ class TimelineHead(Wire):
     termination: str
     runtime_s: RuntimeOut
     validity: Open[Validity] = Field(
-        description="`inherited`: what is broken was so at the horizon's start, or what is frozen "
-        "leads to it; no action that was free to be planned has a part in it."
+        description="`inherited`: all violations existed at the horizon's start or result from "
+        "frozen actions; no freely planned action contributes to them."
     )
     violations: tuple[ViolationOut, ...]
     totals: TotalsOut

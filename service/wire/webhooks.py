@@ -1,4 +1,4 @@
-"""Webhooks, what is sent to them, and how that fared."""
+"""Webhooks, the events sent to them, and their deliveries."""
 
 from __future__ import annotations
 
@@ -24,68 +24,68 @@ DeliveryState = Literal["pending", "delivered", "failed"]
 
 
 class WebhookIn(Body):
-    """Where to send, and what."""
+    """The address of a receiver, and the events to send."""
 
     url: Annotated[str, StringConstraints(min_length=1, max_length=LONGEST_URL)] = Field(
-        description="Gets each event as a POST. `https` only, unless the server allows more."
+        description="Receives each event as a POST. Only `https`, unless the server allows more."
     )
     events: list[ToldEvent] = Field(
         default_factory=lambda: list[ToldEvent](JOB_EVENTS),
         min_length=1,
         max_length=len(EVENTS),
-        description="What is told: ends of jobs, and transitions of plans. By default the former.",
+        description="Ends of jobs and transitions of plans to send. By default all ends of jobs.",
     )
     name: Name | None = None
 
 
 class WebhookOut(Stored):
-    """A webhook, without the secret that signs what it sends."""
+    """A webhook, without the secret that signs its messages."""
 
     id: str
     url: str
     events: tuple[Open[ToldEvent], ...]
     name: str | None
-    owner: str = Field(description="Whose jobs and plans it tells of.")
+    owner: str = Field(description="Owner of the jobs and plans it reports.")
     created_at: Instant
     disabled_at: Instant | None = Field(
-        description="Since when nothing is sent any more: the receiver answered 410."
+        description="Since when nothing has been sent, as the receiver answered 410."
     )
     disabled_because: str | None
     links: dict[str, str]
 
 
 class CreatedWebhook(WebhookOut):
-    """The same with its secret, which is shown this once."""
+    """A new webhook with its secret, which is shown only once."""
 
     secret: str | None = Field(
-        description="For the receiver: verify `webhook-signature` with it. Null in an answer that "
-        "was given before, under the same `Idempotency-Key`."
+        description="The receiver verifies `webhook-signature` with it. Null in an answer that is "
+        "repeated for the same `Idempotency-Key`."
     )
 
 
 class DeliveryOut(Wire):
-    """One message and how it fared."""
+    """One message, and the state of its delivery."""
 
     id: str = Field(description="The `webhook-id` of each of its attempts.")
     event: Open[Event]
     job_id: str | None
     state: Open[DeliveryState]
     attempts: int
-    due_at: Instant | None = Field(description="When it is tried next.")
-    last_status: int | None = Field(description="What the receiver answered last.")
+    due_at: Instant | None = Field(description="When it is next tried.")
+    last_status: int | None = Field(description="HTTP status of the receiver's last answer.")
     last_error: str | None
     created_at: Instant
     ended_at: Instant | None
 
 
 class JobEnd(Wire):
-    """What an event tells of a job."""
+    """The data of an event about a job."""
 
     job_id: str
     state: Open[JobState]
     termination: str | None
     error: ErrorOut | None
-    validity: Open[Validity] | None = Field(None, description="Of its plan; null without one.")
+    validity: Open[Validity] | None = Field(None, description="Null without a plan.")
     warnings: tuple[str, ...] = ()
     solver: str
     label: str | None
@@ -94,14 +94,14 @@ class JobEnd(Wire):
 
 
 class TestData(Wire):
-    """What an event of type `test` tells."""
+    """The data of an event of type `test`."""
 
     message: str
     webhook_id: str
 
 
 class EventOut(Wire):
-    """What is sent to a webhook."""
+    """A message to a webhook."""
 
     type: Open[Event]
     timestamp: Instant
