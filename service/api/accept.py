@@ -1,4 +1,4 @@
-"""Which of several forms an ``Accept`` header likes best (RFC 9110, section 12.5.1)."""
+"""The form that an ``Accept`` header prefers among several (RFC 9110, section 12.5.1)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from service.problems.kinds import ServiceError
 
 
 def require_offered(suffix: str, offered: Collection[str], what: str) -> None:
-    """Refuse a suffix that is none of the forms that something is offered in (406)."""
+    """Refuse (406) a suffix that names none of the offered forms."""
     if suffix not in offered:
         forms = ", ".join(f".{known}" for known in offered)
         raise ServiceError("not_acceptable", f"{what} offered as {forms}.")
 
 
 def preferred(accept: str | None, offered: Sequence[str]) -> str | None:
-    """Return the media type to answer in, or None where none is acceptable.
+    """Return the media type to answer in, or None if none is acceptable.
 
-    Of equally liked types the one that is named wins over those meant by a wildcard, and then
-    the first offered.
+    Of equally preferred types, one that is named wins over one matched by a wildcard, and then
+    the first one offered wins.
 
     >>> preferred("text/csv, */*;q=0.1", ["application/json", "text/csv"])
     'text/csv'
@@ -33,7 +33,7 @@ def preferred(accept: str | None, offered: Sequence[str]) -> str | None:
     for media_type in offered:
         family = media_type.partition("/")[0]
         names = (media_type, f"{family}/*", "*/*")
-        # The most specific range that fits says how much this type is liked.
+        # The most specific range that fits determines the quality of this type.
         fits = [(3 - names.index(name), quality) for name, quality in ranges if name in names]
         if fits:
             precision, quality = max(fits)

@@ -1,4 +1,4 @@
-"""The limits of a body, kept while it comes in: nothing has been read of what is too large."""
+"""Limits of request bodies, enforced while they arrive, before anything parses them."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from service.problems.kinds import ServiceError
 
 PART_WITHIN_S: Final = 20.0
-"""Between two parts of a body."""
+"""Longest wait for a part of a body."""
 BODY_WITHIN_S: Final = 300.0
-"""From the first part that is waited for to the last."""
+"""Longest wait for all parts of a body together."""
 MOST_VALUES: Final = 1_000_000
-"""Objects and lists in one JSON body. An empty one is two bytes, and eighty once it is read."""
+"""Most objects and lists in a JSON body. An empty one takes two bytes, and eighty when parsed."""
 MOST_COMMAS: Final = 5_000_000
-"""Between its values: a number takes two bytes, and thirty once it is read."""
+"""Most commas between its values: a number takes two bytes, and thirty when parsed."""
 
 _BEFORE_JSON: Final = b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n"
-"""Marks of an encoding and space, in any of them."""
+"""Byte-order marks and white space, in any encoding."""
 
 
 class BodyLimit:
-    """Refuse bodies over the limit: at once where the length is declared, else on the way.
+    """Refuse bodies over the limit: at once if the length is declared, else while they arrive.
 
-    Compressed ones are refused too: a small one may hold any amount.
+    Compressed ones are refused too: a small one may expand to any size.
     """
 
     def __init__(self, app: ASGIApp, max_bytes: int):
@@ -60,7 +60,7 @@ class BodyLimit:
             num_bytes += len(part)
             if num_bytes > self.max_bytes:
                 raise HTTPException(413, self._too_many_bytes())
-            # A file that tells its form itself may be JSON as well.
+            # A file whose form is detected from its content may be JSON as well.
             opening = opening or part.lstrip(_BEFORE_JSON)[:1]
             num_values += part.count(b"[") + part.count(b"{")
             num_commas += part.count(b",")
@@ -79,7 +79,7 @@ class BodyLimit:
 
 
 class _InTime:
-    """Waits for the parts of a body, not for ever; who has sent all may be silent."""
+    """Waits for the parts of a body for a limited time, and without limit after the last."""
 
     def __init__(self, clock: asyncio.AbstractEventLoop):
         self._clock = clock
@@ -87,7 +87,7 @@ class _InTime:
         self._is_whole = False
 
     async def __call__(self, receive: Receive) -> Message:
-        """Return the next message; 408 where it does not come."""
+        """Return the next message; 408 if it does not come in time."""
         if self._is_whole:
             return await receive()
         began_s = self._clock.time()
@@ -96,7 +96,7 @@ class _InTime:
                 message = await receive()
         except TimeoutError:
             raise HTTPException(408, "The body did not come in time.") from None
-        # Only waiting counts: what is done with a part in between is not the client's fault.
+        # Only waiting counts, not the time that the service takes to process a part.
         self._left_s -= self._clock.time() - began_s
         self._is_whole = not message.get("more_body", False)
         return message

@@ -38,7 +38,7 @@ router = APIRouter(prefix="/v1/comparisons", tags=["comparisons"])
 
 @router.post("", status_code=202, responses=problem_responses(503))
 def create_comparison(body: ComparisonIn, call: CallDep, once: OnceDep) -> ComparisonOut:
-    """Queue a job for each run, all or none; the answer tells where the table grows."""
+    """Queue a job for each run, all or none; the answer's `Location` is where to find the table."""
     params = []
     for position, run in enumerate(body.runs):
         with inside(f"/runs/{position}"):
@@ -81,7 +81,7 @@ def list_comparisons(call: CallDep, paging: PagingDep) -> Listed[ComparisonOut]:
 
 @router.get("/{comparison_id}", response_model=ComparisonOut, responses=readable())
 def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Response:
-    """Return the table as it stands: a line fills when its job has an answer."""
+    """Return the table as it stands; a row is filled in when its job has an answer."""
     with call.database.reading() as session:
         shown = _shown(session, [_find(session, comparison_id, call)])[0]
     _describe(call.response, shown)
@@ -90,7 +90,7 @@ def get_comparison(comparison_id: str, call: CallDep) -> ComparisonOut | Respons
 
 @router.delete("/{comparison_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_comparison(comparison_id: str, call: CallDep) -> None:
-    """Delete a comparison. Its runs stay jobs like any other."""
+    """Delete a comparison. The jobs of its runs remain."""
     with call.noted("delete", "comparison", comparison_id) as session:
         row = _find(session, comparison_id, call)
         matched(call, row, lambda row: _shown(session, [row])[0])

@@ -1,4 +1,4 @@
-"""From exception to answer: every error leaves the server as an RFC 9457 problem document."""
+"""Exceptions as answers: every error leaves the server as an RFC 9457 problem document."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def install_error_handlers(app: FastAPI) -> None:
 
 
 def refusals(app: FastAPI) -> dict[Any, Any]:
-    """Return the handlers for what stands before the routes, and refuses by raising as well."""
+    """Return the handlers for middleware before the routes, which also refuses by raising."""
     return {kind: on for kind, on in app.exception_handlers.items() if kind is not Exception}
 
 
@@ -94,12 +94,12 @@ def problem(
 
 
 def _sendable(text: str) -> str:
-    # JSON can spell half a surrogate pair, as a field's name for example; UTF-8 cannot.
-    # And who put a key into an address by mistake finds no copy of it in the answer.
+    # JSON can hold a lone surrogate, for example in a field's name; UTF-8 cannot.
+    # A key that was put into an address by mistake is not repeated in the answer.
     return masked(text.encode("utf-8", "replace").decode())
 
 
-# What needs no thread is async: who is refused must not wait for one.
+# Handlers that need no thread are async, so that refusals do not wait for one.
 
 
 async def _on_service_error(request: Request, error: ServiceError) -> JSONResponse:
@@ -116,7 +116,7 @@ def _on_validation_error(request: Request, error: RequestValidationError) -> JSO
 
 
 _HTTP_CODES = {
-    400: "malformed_json",  # FastAPI's word for a body it could not parse at all
+    400: "malformed_json",  # FastAPI's status for a body it could not parse at all
     404: "not_found",
     405: "method_not_allowed",
     406: "not_acceptable",
@@ -137,7 +137,7 @@ def _on_http_exception(request: Request, error: HTTPException) -> JSONResponse:
 
 
 def _methods(request: Request) -> list[str]:
-    # Each method is a route of its own, and the framework names those of the first one alone.
+    # Each method is a separate route, and the framework lists only those of the first route.
     path = getattr(request.scope.get("route"), "path", None)
     routes = iter_route_contexts(request.app.routes)
     return sorted(
@@ -157,11 +157,11 @@ def _http_detail(request: Request, error: HTTPException) -> str:
 
 
 async def _on_database_error(request: Request, error: Exception) -> JSONResponse:
-    # Away or full; what is a fault of ours is raised again.
+    # Unavailable or full; our own faults are raised again.
     why = why_unavailable(error)
     if why is None:
         raise error
-    # The driver's words alone: SQLAlchemy's would add the statement and its values.
+    # Only the driver's message: SQLAlchemy's would add the statement and its values.
     logger.warning("the database did not serve a request: %s", getattr(error, "orig", error))
     headers = {"Retry-After": str(DATABASE_RETRY_S)}
     return problem(request, "database_unavailable", why, headers=headers)
@@ -175,6 +175,6 @@ def _on_bug(request: Request, error: Exception) -> JSONResponse:
         request,
         "internal_error",
         f"The service failed; its log has request {request.state.request_id}.",
-        # This answer is made outside of all that adds headers.
+        # This answer is made outside the middleware that adds headers.
         headers={"X-Request-ID": request.state.request_id} | SECURITY_HEADERS,
     )

@@ -1,6 +1,6 @@
-"""Bodies that work, for the OpenAPI document: one for each shape and kind of file that is sent.
+"""Working bodies for the OpenAPI document, one for each shape and kind of file that is sent.
 
-Ids are made up; everything else can be sent as it stands.
+Ids are made up; everything else can be sent unchanged.
 """
 
 from __future__ import annotations
@@ -60,16 +60,16 @@ BODIES: Final[dict[str, Any]] = {
     "TargetCatalogPatch": {"rewards": {"bern": 5}},
     "WebhookIn": {"url": "https://ops.example/slewline", "events": ["job.succeeded"]},
 }
-"""By the name of the schema."""
+"""Examples by the name of the schema."""
 
 _EXECUTIONS: Final = [{"action_id": "a2", "outcome": "executed", "mbit": 120.5}]
-"""What is reported of a plan."""
+"""Execution reports of a plan."""
 
 _STATES: Final = [
     {"satellite_id": _ID, "at": "2019-01-01T06:00:00Z", "battery_fraction": 0.82,
      "recorder_fraction": 0.31}
 ]  # fmt: skip
-"""What telemetry tells of a plan's satellites."""
+"""Telemetry of a plan's satellites."""
 
 _FEATURES: Final = {
     "type": "FeatureCollection",
@@ -134,11 +134,11 @@ FILES: Final[dict[tuple[str, str], Any]] = {
     ("/v1/target-catalogs", "application/geo+json"): _FEATURES,
     ("/v1/target-catalogs", "text/csv"): "id,lat_deg,lon_deg,reward\nbern,46.948,7.447,1\n",
 }
-"""By path and media type."""
+"""Examples by path and media type."""
 
 
 def add_examples(document: dict[str, Any]) -> None:
-    """Put the examples where the document describes what they are examples of."""
+    """Add the examples to the schemas of the document."""
     schemas = document["components"]["schemas"]
     for name, body in BODIES.items():
         schemas[name]["examples"] = [body]

@@ -1,4 +1,4 @@
-"""A job's changes: waited for without a thread that waits, and sent as events."""
+"""A job's changes: waited for without blocking a thread, and sent as events."""
 
 from __future__ import annotations
 
@@ -44,20 +44,19 @@ async def job_events(
     job_id: str,
     call: CallDep,
     last_event_id: Annotated[
-        str, Header(alias="Last-Event-ID", description="The last event that was seen.")
+        str, Header(alias="Last-Event-ID", description="Id of the last event that was seen.")
     ] = "",
 ) -> Response:
     """Send the job as it is, then at each change, until it is final.
 
-    Each event's data is what `GET /v1/jobs/{id}` answers. With `Last-Event-ID` the first
-    event comes when the job is no longer what that event told. The stream also ends where the
-    database fails: ask again with `Last-Event-ID`. It ends for good with the key it was asked
-    for with.
+    Each event's data is what `GET /v1/jobs/{id}` returns. With `Last-Event-ID` the first event
+    is sent when the job differs from that event. The stream also ends if the database fails: ask
+    again with `Last-Event-ID`. It ends for good when the key it was requested with becomes invalid.
     """
     job, _ = await wait_for_change(call.questions, job_id, None, 0.0, _never)
     seen = last_event_id or _NOTHING_SEEN
     if job.state in FINAL and seen == str(job.version):
-        # What browsers do after a stream has ended is to ask for it again, for ever.
+        # After the end of a stream, browsers would otherwise ask for it again for ever.
         return Response(status_code=204)
     return StreamingResponse(
         _events(call.questions, _Listener(call.questions, call.caller), job_id, f'"{seen}"'),
@@ -80,7 +79,7 @@ async def _events(
             why = why_unavailable(error)
             if why is None:
                 raise
-            # Who asks again with Last-Event-ID misses nothing.
+            # A client that asks again with Last-Event-ID misses nothing.
             log.warning("a stream of events ended early (%s)", why, extra={"job_id": job_id})
             return
         if etag_of_job(job) != seen:
@@ -99,7 +98,7 @@ async def _never() -> bool:
 
 
 class _Listener:
-    """Who reads a stream, and whether the key that it was asked for with is still good."""
+    """The reader of a stream, and whether the key it was requested with is still valid."""
 
     def __init__(self, questions: Questions, caller: Caller):
         self._questions = questions
@@ -108,7 +107,7 @@ class _Listener:
         self._has_lost_its_key = False
 
     async def has_lost_its_key(self) -> bool:
-        """Return whether it is revoked or expired, looking every other second."""
+        """Return whether the key is revoked or expired, checking every other second."""
         if self._key_id is not None and time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + _LOOK_AT_KEY_EVERY_S
             self._has_lost_its_key = bool(await self._questions.ended_keys.get(self._key_id))
@@ -122,17 +121,17 @@ async def wait_for_change(
     wait_s: float,
     is_disconnected: Callable[[], Awaitable[bool]],
 ) -> tuple[JobRow, str]:
-    """Return a job and its scenario's hash, at the latest after ``wait_s``.
+    """Return a job and its scenario's hash when it changes, at the latest after ``wait_s``.
 
     Parameters
     ----------
     known
-        The client's ``If-None-Match``: what it has seen; None for what is there now.
+        The client's ``If-None-Match``, the state it has seen; None for the present state.
 
     Raises
     ------
     ServiceError
-        Where there is no such job.
+        If there is no such job.
     """
     job, sha256 = await _read(questions, job_id)
     seen = etag_of_job(job) if known is None else known
@@ -143,7 +142,7 @@ async def wait_for_change(
         if left_s <= 0 or await is_disconnected():
             break
         await asyncio.sleep(min(_LOOK_EVERY_S, left_s))
-        # Only a number is read until it moves: many may wait at once.
+        # Only the version is read until it changes, as many clients may wait at once.
         if await questions.versions.get(job_id) != job.version:
             job, sha256 = await _read(questions, job_id)
     return job, sha256

@@ -42,9 +42,9 @@ LONGEST_WAIT_S: Final = 30.0
 
 @router.post("", status_code=202, responses=problem_responses(503))
 def create_job(body: JobIn, call: CallDep, once: OnceDep) -> JobOut:
-    """Queue a job; the answer tells where to follow it.
+    """Queue a job; the answer's `Location` is where to follow it.
 
-    Jobs with a higher `priority` start first, those of the same priority in their order.
+    Jobs with a higher `priority` start first, those of the same priority in order of arrival.
     """
     asked = intake.asked_for(body, call)
     inline = intake.frozen(call, body)
@@ -85,13 +85,13 @@ async def get_job(
     job_id: str,
     call: CallDep,
     wait: Annotated[
-        float, Query(ge=0, le=LONGEST_WAIT_S, description="Hold so many seconds for a change.")
+        float, Query(ge=0, le=LONGEST_WAIT_S, description="Seconds to wait for a change.")
     ] = 0.0,
 ) -> JobOut | Response:
     """Return one job.
 
-    With `wait` the answer is held until the job changes: from what `If-None-Match` names, or
-    else from what it is now. A finished job is answered at once.
+    With `wait` the answer is delayed until the job changes: from the state that `If-None-Match`
+    names, or else from the present one. A finished job is returned at once.
     """
     known = call.request.headers.get("if-none-match")
     job, sha256 = await wait_for_change(
@@ -103,7 +103,7 @@ async def get_job(
 
 @router.post("/{job_id}/cancel", status_code=202, responses=problem_responses(404, 409, 503))
 def cancel_job(job_id: str, call: CallDep) -> JobOut:
-    """Cancel a job: at once where it waits; a running one stops and keeps its best plan so far."""
+    """Cancel a job: at once if it is queued; a running one stops and keeps its best plan so far."""
     with call.noted("cancel", "job", job_id) as session:
         job = intake.find_job(session, job_id)
         was_waiting = job.state == "queued"
@@ -123,7 +123,7 @@ def cancel_job(job_id: str, call: CallDep) -> JobOut:
 
 @router.delete("/{job_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_job(job_id: str, call: CallDep) -> None:
-    """Delete a finished job with its answer, for good: not one that a plan or a comparison has."""
+    """Delete a finished job and its answer permanently, unless a plan or a comparison uses it."""
     with call.noted("delete", "job", job_id) as session:
         job = intake.find_job(session, job_id)
         require_match(call, etag_of_job(job))
@@ -132,10 +132,10 @@ def delete_job(job_id: str, call: CallDep) -> None:
 
 @router.post("/{job_id}/rerun", status_code=202, responses=problem_responses(404, 503))
 def rerun_job(job_id: str, call: CallDep, once: OnceDep) -> JobOut:
-    """Queue the same question again as a new job, whatever became of the first.
+    """Queue the same question again as a new job, whatever the outcome of the first.
 
-    Scenario, solver, params, seed, limits, priority and label are the first one's, to which
-    `links.rerun_of` leads. Same seed and same version of the service give the same plan.
+    Scenario, solver, params, seed, limits, priority and label are those of the first job, which
+    `links.rerun_of` names. The same seed and version of the service give the same plan.
     """
     queue = intake.queue_with_room(call)
     with once.transaction() as session:

@@ -1,4 +1,4 @@
-"""Who changed what, whom a caller is taken for, health, version, and what problem codes mean."""
+"""Audit events, the caller, health, version, and explanations of problem codes."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ WORKER_SILENCE = timedelta(seconds=30)
 def list_audit_events(
     call: CallDep,
     paging: PagingDep,
-    object_id: Annotated[str | None, Query(description="Only of this object.")] = None,
-    kind: Annotated[str | None, Query(description="Only of objects of this kind.")] = None,
-    action: Annotated[str | None, Query(description="Only this action.")] = None,
-    owner: Annotated[str | None, Query(description="Only by keys of this owner.")] = None,
+    object_id: Annotated[str | None, Query(description="Only events of this object.")] = None,
+    kind: Annotated[str | None, Query(description="Only events of this kind of object.")] = None,
+    action: Annotated[str | None, Query(description="Only events with this action.")] = None,
+    owner: Annotated[str | None, Query(description="Only events by keys of this owner.")] = None,
 ) -> Listed[AuditEventOut]:
     """List who changed what, newest first. Needs the scope `admin`."""
     wanted = {"object_id": object_id, "kind": kind, "action": action, "owner": owner}
@@ -45,20 +45,20 @@ def list_audit_events(
 
 @router.get("/v1/me")
 def who_am_i(call: CallDep) -> CallerOut:
-    """Say whose key this is and what it allows."""
+    """Return the owner of the key and what it allows."""
     return from_row(CallerOut, call.caller, scope=call.caller.scope.value)
 
 
 @router.get("/health/live")
 async def live() -> Live:
-    """Say that the process answers; nothing else is asked."""
-    # Not in a thread: those may all be waiting for a database that hangs.
+    """Return that the process answers. Nothing else is checked."""
+    # Not in a thread: all threads may be waiting for a database that hangs.
     return Live()
 
 
 @router.get("/health/ready", responses=problem_responses(503))
 def ready(call: CallDep) -> Ready:
-    """Say whether database and queue answer, and a worker was heard of in the last 30 seconds."""
+    """Check that database and queue answer and that a worker reported in the last 30 seconds."""
     workers = _recent_workers(call.database)
     _ask_queue(call.request.app.state.queue)
     if not workers:

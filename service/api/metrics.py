@@ -1,7 +1,7 @@
-"""``GET /metrics``: the service in the text format of Prometheus.
+"""``GET /metrics``: figures of the service in the text format of Prometheus.
 
-What concerns jobs comes from the database, so that every API process tells the same; calls
-are counted by each process for itself.
+Figures of jobs come from the database, so that every API process returns the same; each process
+counts only its own calls.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class CallCounters:
 def metrics(call: CallDep) -> Response:
     """Return figures for Prometheus: jobs, workers, orbits, and the calls of this process.
 
-    Where the database does not answer, `slewline_database_up` is 0 and its figures are absent.
+    If the database does not answer, `slewline_database_up` is 0 and its figures are absent.
     """
     counters: CallCounters = call.request.app.state.call_counters
     stored = _Collected(list(_families(call.database)))
@@ -86,7 +86,7 @@ def metrics(call: CallDep) -> Response:
 
 
 class _Collected:
-    """Families read once, for one answer."""
+    """Metric families read once, for one answer."""
 
     def __init__(self, families: list[Metric]):
         self._families = families
@@ -102,7 +102,7 @@ def _families(database: Database) -> Iterator[Metric]:
         with database.reading() as session:
             stored = [*_of_jobs(session), *_of_others(session)]
     except sa.exc.DatabaseError:
-        pass  # told by the next family
+        pass  # the next family reports it
     up = 1.0 if stored else 0.0
     yield GaugeMetricFamily("slewline_database_up", "1 where the database answers.", up)
     yield from stored
@@ -154,7 +154,7 @@ def _of_others(session: Session) -> Iterator[Metric]:
 
 
 def _gauge(name: str, about: str, label: str, values: Mapping[str, float]) -> Metric:
-    """Return a figure for each value of one label."""
+    """Return a gauge with a figure for each value of one label."""
     family = GaugeMetricFamily(name, about, labels=[label])
     for value, number in values.items():
         family.add_metric([value], number)

@@ -1,4 +1,4 @@
-"""What happens around every request: its id, its log line."""
+"""Work around every request: its id, its log line, its count."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ACCEPTABLE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 
 class RequestContext:
-    """Give each request an id: the caller's ``X-Request-ID`` where it is usable, else ours."""
+    """Give each request an id: the caller's ``X-Request-ID`` if it is usable, else a new one."""
 
     def __init__(self, app: ASGIApp, counters: CallCounters):
         self.app = app
@@ -69,10 +69,10 @@ class RequestContext:
 
 
 def _is_routine(status: int, path: str) -> bool:
-    """Return whether a request is one of many alike, which metrics count.
+    """Return whether a request is one of many alike, for which metrics suffice.
 
-    Dashboards ask again and again for what has not changed; who waits for the service to be
-    ready, ten times a second.
+    Dashboards ask again and again for what has not changed, and clients that wait for the service
+    to be ready ask ten times a second.
     """
     if status == HTTPStatus.NOT_MODIFIED:
         return True

@@ -1,4 +1,4 @@
-"""Polls of jobs and of timelines, answered before all else: dashboards ask little else."""
+"""Polls of jobs and timelines, most requests of dashboards, answered before the routes."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
 from service.stores import job_store
 
-# Ids by their form: one that the database cannot even read would spoil the query of the others.
+# Only well-formed ids: a malformed one would make the query fail for all others.
 _PATH: Final = re.compile(r"/v1/jobs/([0-9a-f-]{36})(/timeline)?")
 _JSON: Final = "application/json"
 _ACCEPTABLE: Final = (None, "*/*", _JSON)
-# Made once: to make and compile a query takes longer than to run it.
+# Made once: making and compiling a query takes longer than running it.
 _THESE: Final = JobRow.id.in_(sa.bindparam("ids", expanding=True))
 _JOBS: Final = sa.select(
     JobRow.id, JobRow.tenant, JobRow.version, JobRow.state, JobRow.created_at
@@ -46,17 +46,17 @@ Poll = tuple[str, str | None]
 
 
 class Polls:
-    """Answer ``GET`` of a job, and 304 where a client has a job's timeline already.
+    """Answer ``GET`` of a job, and 304 if a client has a job's timeline already.
 
-    The routes would answer the same, each call for itself and after finding out what only other
-    calls need. Here polls that come at about the same time share one query, and those who follow
-    the same job its answer. Everything else is left to the routes: refusals, other forms, a
-    database that fails.
+    The routes would give the same answers, but each call by itself and after work that only other
+    calls need. Here polls that arrive at about the same time share one query, and clients that
+    follow the same job share its answer. Everything else is left to the routes: refusals, other
+    forms, failures of the database.
 
     Parameters
     ----------
     state
-        The application's, whose ``database`` is asked.
+        The state of the application, with its ``database``.
     """
 
     def __init__(self, app: ASGIApp, state: State):
@@ -75,7 +75,7 @@ class Polls:
         if scope["type"] != "http" or scope["method"] != "GET" or scope["query_string"]:
             return None
         path, headers = _PATH.fullmatch(scope["path"]), Headers(scope=scope)
-        # The other forms of a timeline have other names.
+        # Other forms of a timeline have other paths and ETags.
         if path is None or headers.get("accept") not in _ACCEPTABLE:
             return None
         job_id, end = path.groups()
@@ -95,7 +95,7 @@ class Polls:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """What a poll is answered; no ``body`` where the client has it."""
+    """The answer to a poll, without a ``body`` if the client has it."""
 
     owner: str
     headers: dict[str, str]
@@ -108,9 +108,9 @@ class _Found:
 
 
 class _Polled:
-    """What clients ask for again and again.
+    """A kind of resource that clients poll.
 
-    ``path_format`` is that of its route, which metrics ask for.
+    ``path_format`` is that of its route, for metrics.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class _Polled:
 
 
 class _PolledJobs:
-    """Jobs. The last whole answer of each is kept for the others who follow it."""
+    """Answers to polls of jobs; the last full one of each is kept for the job's other clients."""
 
     def __init__(self, state: State):
         self._state = state
@@ -169,7 +169,7 @@ class _PolledJobs:
 
 
 def _known_timelines(state: State, polls: Sequence[Poll]) -> Mapping[Poll, _Found]:
-    """Return which timelines clients have: they never change."""
+    """Return which timelines the clients have already: timelines never change."""
     known = [poll for poll in polls if matches(poll[1], etag_of_timeline(poll[0]))]
     rows = _rows(cast(Database, state.database), _TIMELINES, known) if known else {}
     return {
@@ -182,7 +182,7 @@ def _known_timelines(state: State, polls: Sequence[Poll]) -> Mapping[Poll, _Foun
 def _rows(
     database: Database, query: sa.Select[*tuple[Any, ...]], polls: Sequence[Poll]
 ) -> Mapping[str, sa.Row[Any]]:
-    """Return what there is of the polled jobs, by id."""
+    """Return the rows of the polled jobs, by id."""
     job_ids = list({job_id for job_id, _ in polls})
     with database.asking_untested() as connection:
         return {row.id: row for row in connection.execute(query, {"ids": job_ids})}

@@ -1,7 +1,7 @@
-"""What many requests ask the database at about the same time: each kind takes one query.
+"""Questions that many requests ask the database at the same time, one query for each kind.
 
-One thread asks for each kind. However many requests of one owner come at once, they take no
-thread that others wait for.
+Each kind has one thread. However many requests of one owner arrive at once, they take no thread
+that others wait for.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ class Questions:
     Attributes
     ----------
     callers
-        Whose tokens these are; none where one is wrong, expired or revoked.
+        The callers of tokens; none for a token that is wrong, expired or revoked.
     ended_keys
         Ids of keys that are revoked or expired.
     owners
-        Whose jobs these are.
+        The owners of jobs.
     jobs
         Jobs, each with the hash of its scenario.
     versions
-        The numbers of jobs that grow with every visible change.
+        The versions of jobs: numbers that grow with every visible change.
 
     Parameters
     ----------
     state
-        The application's, whose ``database`` is asked.
+        The state of the application, with its ``database``.
     """
 
     def __init__(self, state: State):
@@ -78,5 +78,5 @@ class Questions:
 
 
 def _readable(job_ids: Sequence[str]) -> list[str]:
-    # One that the database cannot even read would spoil the query of the others.
+    # A malformed id would make the query fail for all others.
     return [job_id for job_id in job_ids if _JOB_ID.fullmatch(job_id)]

@@ -55,8 +55,8 @@ _IMPORT_TYPES = ("text/plain", "application/json", "text/csv", "application/xml"
 def create_satellite(body: SatelliteIn, once: OnceDep) -> SatelliteOut:
     """Store one satellite.
 
-    There is one satellite of a catalogue number: 409 `duplicate_norad_cat_id` names it. Number 0
-    says nothing, so that many may have it.
+    Each catalogue number belongs to one satellite: 409 `duplicate_norad_cat_id` names it. Number 0
+    means that it is unknown; any number of satellites may have it.
     """
     orbit = orbit_from(body)
     with once.transaction() as session:
@@ -84,15 +84,15 @@ def import_satellites(
     once: OnceDep,
     on_error: OnErrorQuery = OnError.SKIP,
     spacecraft: Annotated[
-        str, Query(description="Id of the new satellites' type, or the name of one built in.")
+        str, Query(description="Spacecraft type of new satellites: an id or a built-in name.")
     ] = DEFAULT,
 ) -> Imported[ImportedSatellite]:
     """Store the element sets or ephemerides of a file; new satellites are of one spacecraft type.
 
     Importing the same file again changes nothing: a record whose catalogue number is stored
-    joins that satellite, as a further element set where its epoch is new. Two records of one
-    satellite and epoch in a file are one; the second is reported. An ephemeris (OEM) has no
-    catalogue number: it joins the satellite of its object's name, where there is one.
+    is added to that satellite if its epoch is new. If a file has two records of one satellite and
+    epoch, the second is only reported. An ephemeris (OEM) has no catalogue number: it is added to
+    the satellite with its object's name, if there is one.
     """
     found = read_elements(data, file_type(call.request, data, *_IMPORT_TYPES))
     refuse_if_asked(len(found.entries), found.faults, on_error)
@@ -133,9 +133,9 @@ def get_satellite(satellite_id: str, call: CallDep) -> SatelliteOut | Response:
 
 @router.patch("/{satellite_id}", responses=problem_responses(404, 412))
 def change_satellite(satellite_id: str, body: SatellitePatch, call: CallDep) -> SatelliteOut:
-    """Change a satellite's name or settings. Scenarios that exist do not change.
+    """Change a satellite's name or settings. Existing scenarios do not change.
 
-    `If-Match` takes the ETag of the satellite. Its elements have a call of their own.
+    `If-Match` takes the ETag of the satellite. Elements are added by a call of their own.
     """
     with call.database.transaction() as session:
         row = find_satellite(session, satellite_id, to_change=True)
@@ -163,10 +163,10 @@ def delete_satellite(satellite_id: str, call: CallDep) -> None:
 
 @router.put("/{satellite_id}/elements", responses=problem_responses(404, 412))
 def put_elements(satellite_id: str, body: OrbitIn, call: CallDep) -> SatelliteOut:
-    """Store a further element set of the satellite; that of the newest epoch is in force.
+    """Store a further element set of the satellite; the one of the newest epoch is in force.
 
-    Older ones stay readable. Scenarios that exist do not change. `If-Match` takes the ETag of
-    the satellite.
+    Older ones stay readable. Existing scenarios do not change. `If-Match` takes the ETag of the
+    satellite.
     """
     orbit = orbit_from(body)
     with call.noted("add_elements", "satellite", satellite_id) as session:
@@ -189,7 +189,7 @@ def list_elements(satellite_id: str, call: CallDep, paging: PagingDep) -> Listed
 
 
 def find_satellite(session: Session, satellite_id: str, *, to_change: bool = False) -> SatelliteRow:
-    """Return a satellite, its row locked where it is to change; 404 where there is none."""
+    """Return a satellite, its row locked if it is to change; 404 if there is none."""
     return existing(session, SatelliteRow, "satellite", satellite_id, to_change=to_change)
 
 
@@ -214,7 +214,7 @@ def _changed(session: Session, before: SatelliteOut, body: SatellitePatch) -> Wh
 
 
 def _merged(before: P, changes: P | None) -> P:
-    """Return settings with those that a client has sent in place of their own."""
+    """Return settings updated by those that a client has sent."""
     sent = {} if changes is None else changes.model_dump(exclude_unset=True)
     return before.model_copy(update=sent)
 
@@ -243,7 +243,7 @@ def _shown(session: Session, rows: Sequence[SatelliteRow]) -> list[SatelliteOut]
 
 
 def _told(orbit: Json) -> Json:
-    """Return what an answer tells of an orbit; of an ephemeris, whose states are many, a little."""
+    """Return the orbit as answers show it; an ephemeris, with its many states, is summarised."""
     oem = asdict(outline_of(orbit["oem"])) if "oem" in orbit else None
     return {"tle": orbit.get("tle"), "omm": orbit.get("omm"), "oem": oem}
 

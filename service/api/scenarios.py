@@ -56,9 +56,9 @@ _KINDS: dict[str, int] = {"collect": COLLECT, "contact": CONTACT}
     responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
 )
 def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioOut:
-    """Freeze a question: everything it names is copied into it.
+    """Freeze a planning question: everything it names is copied into it.
 
-    The same content again, under whatever name, answers 200 with the scenario that is there.
+    If the same content is stored already, under any name, the answer is 200 with that scenario.
     """
     frozen = intake.freeze(call, body)
     with once.transaction() as session:
@@ -78,8 +78,8 @@ def list_scenarios(
 ) -> Listed[ScenarioSummary]:
     """List the scenarios, newest first, without their pins, outages and states.
 
-    Those that were sent with a job, or made by a what-if, are their owner's and not listed for
-    others; the scope `admin` sees all.
+    Those that were sent with a job, or made by a what-if, are listed only for their owner; the
+    scope `admin` sees all.
     """
     query = sa.select(ScenarioRow).where(scenario_store.seen_by(call.caller.visible_owner))
     query = by_name(stored.narrow(query, ScenarioRow.created_at), ScenarioRow.name, name)
@@ -94,7 +94,7 @@ def get_scenario(
     scenario_id: str,
     call: CallDep,
     expand: Annotated[
-        bool, Query(description="Answer the self-contained scenario file instead.")
+        bool, Query(description="Return the self-contained scenario file instead.")
     ] = False,
 ) -> ScenarioOut | Response:
     """Return one scenario; with `expand`, as the file that `slewline solve` takes."""
@@ -108,7 +108,7 @@ def get_scenario(
 
 @router.delete("/{scenario_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_scenario(scenario_id: str, call: CallDep) -> None:
-    """Delete a scenario for good, with its opportunities: not one that jobs have."""
+    """Delete a scenario and its opportunities permanently, unless a job uses it."""
     with call.noted("delete", "scenario", scenario_id) as session:
         row = matched(call, _find(session, scenario_id, call.caller), _shown)
         deletion.delete_scenario(session, row)
@@ -120,14 +120,14 @@ def list_opportunities(
     call: CallDep,
     paging: PagingDep,
     target_id: Annotated[str | None, Query(description="Only collects of this target.")] = None,
-    satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
+    satellite_id: Annotated[str | None, Query(description="Only with this satellite.")] = None,
     kind: Annotated[Kind | None, Query(description="Only collects or only contacts.")] = None,
-    edges: Annotated[bool, Query(description="Say what holds at start and end, too.")] = False,
+    edges: Annotated[bool, Query(description="Add the geometry at start and end.")] = False,
 ) -> Listed[OpportunityOut]:
-    """List what could be done before any planning, in order of start.
+    """List the opportunities of a scenario, in order of start.
 
-    The first call computes the opportunities, which may take a while: 503 with `Retry-After`
-    asks to come back.
+    The first call computes them, which may take a while: 503 with `Retry-After` asks to try
+    again later.
     """
     with call.database.reading() as session:
         sha256 = _find(session, scenario_id, call.caller).sha256
@@ -141,7 +141,7 @@ def list_opportunities(
 
 
 def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]]:
-    """Return what holds at start and end of each of these opportunities."""
+    """Return the geometry at start and end of each of these opportunities."""
     scenario, table = described.scenario, described.computed.opportunities
     chosen = np.array(rows, dtype=np.int64)
     first = view_at(scenario, table, chosen, table.start_s[chosen])
@@ -153,7 +153,7 @@ def _edges(described: Described, rows: Sequence[int]) -> list[dict[str, ViewOut]
 
 
 def _seen(seen: View | Opportunities, row: int) -> dict[str, Any]:
-    """Return what satellite and place see of each other, as answers have it."""
+    """Return the geometry between a satellite and a site, as answers show it."""
     angles = ("off_nadir_deg", "elevation_deg", "azimuth_deg", "sun_elevation_deg")
     return {
         **{name: round(float(getattr(seen, name)[row]), 6) for name in angles},

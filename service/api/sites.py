@@ -1,9 +1,9 @@
-"""Which names lead here, and whose pages may change anything.
+"""Host names of the service, and the sites whose pages may change anything.
 
-Being on this machine, or in its network, is a credential that a browser lends to every page of
-the internet: such a page posts to us, or has a name of its own lead to our address and is then
-taken for one of ours. Browsers say which name was called and where a request comes from, and no
-page can change what they say.
+A browser on this machine, or in its network, lends its access to every page of the internet: a
+page can post to the service, or let its own host name point to our address and so pass for one of
+our pages. Browsers send the host name that was called and the origin of a request, and no page can
+change these.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _USUAL_PORTS: Final = (":80", ":443")
 class Sites:
     """The service's own site, and those that are allowed to call it from a browser.
 
-    Starlette's own check of hosts cannot read IPv6 addresses and answers no problem document.
+    Starlette's own check of hosts cannot read IPv6 addresses and sends no problem document.
 
     Parameters
     ----------
     hosts
-        Names, without a port, that lead here; "*" for any.
+        Host names of the service, without a port; "*" for any.
     origins
-        Other sites whose pages may call.
+        Other sites whose pages may call it.
     """
 
     def __init__(self, hosts: Collection[str], origins: Collection[str]):
@@ -40,7 +40,7 @@ class Sites:
         self._origins = origins
 
     def check(self, method: str, headers: Headers) -> None:
-        """Raise 421 for a name that is not ours, and 403 for a foreign page that writes."""
+        """Raise 421 for a host name that is not ours, and 403 for a foreign page that writes."""
         host = headers.get("host", "")
         if not self._is_ours(host):
             raise ServiceError(
@@ -88,7 +88,7 @@ def _is_address(name: str) -> bool:
 
 
 def _site(host: str) -> str:
-    """Return host and port, without the port that goes without saying."""
+    """Return host and port, without a default port."""
     host = host.lower()
     for port in _USUAL_PORTS:
         host = host.removesuffix(port)

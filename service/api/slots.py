@@ -1,4 +1,4 @@
-"""Places that many want at once: so many in all, so many for each owner, and a fair turn."""
+"""Slots for concurrent requests: limited in all and for each owner, with a fair queue."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _ASK_AGAIN_S: Final = 5
 
 
 class Slots:
-    """Lets ``most`` hold a place, ``of_owner`` of one owner; others wait, or are refused.
+    """Lets ``most`` requests hold a slot, ``of_owner`` of one owner; others wait or are refused.
 
-    Who comes first is first, but for those whose owner has all its places already. For one event
-    loop.
+    First come, first served, except for requests whose owner holds all its slots already. For one
+    event loop.
 
     Parameters
     ----------
     waiting, waiting_of_owner
-        How many may wait for a place; more are refused at once (503 ``too_busy``).
+        How many may wait for a slot; more are refused at once (503 ``too_busy``).
     wait_s
         How long they wait before they are refused.
     """
@@ -46,7 +46,7 @@ class Slots:
 
     @asynccontextmanager
     async def held(self, owner: str) -> AsyncIterator[None]:
-        """Hold a place, after waiting for it where there is none."""
+        """Hold a slot, after waiting for one if none is free."""
         await self._take(owner)
         try:
             yield
@@ -68,7 +68,7 @@ class Slots:
             raise _too_busy() from None
         except asyncio.CancelledError:
             if turn.done() and not turn.cancelled():
-                self._give_back(owner)  # it was given the place and has gone
+                self._give_back(owner)  # it was given the slot and has gone
             raise
         finally:
             self._queue.pop(turn, None)

@@ -1,4 +1,4 @@
-"""The solvers there are, and their parameters."""
+"""The available solvers and their parameters."""
 
 from __future__ import annotations
 

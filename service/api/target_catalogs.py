@@ -44,7 +44,7 @@ _AT_ONCE = 500  # parameters of one statement
 
 
 class _Listed(Body):
-    """The same, with targets that are still to be looked at one by one."""
+    """A catalogue whose targets are still to be checked one by one."""
 
     name: Name
     targets: list[dict[str, Any]] = Field(min_length=1, max_length=MAX_TARGETS)
@@ -77,10 +77,10 @@ def create_target_catalog(
     data: RawBodyDep,
     once: OnceDep,
     name: Annotated[
-        Name | None, Query(description="Name of a catalogue whose file has none.")
+        Name | None, Query(description="Name of the catalogue, if its file has none.")
     ] = None,
 ) -> CreatedCatalog:
-    """Store a catalogue. One bad row refuses the whole of it; every bad row is named."""
+    """Store a catalogue. If any row is bad, nothing is stored and every bad row is named."""
     kind = file_type(call.request, data, *_TYPES)
     found, targets = read_targets(kind, data)
     with once.transaction() as session:
@@ -98,7 +98,7 @@ def read_targets(kind: str, data: bytes) -> tuple[Records, list[TargetIn]]:
     Raises
     ------
     ServiceError
-        With every fault of the file, where there is any.
+        With every fault of the file, if there is any.
     """
     match kind:
         case "text/csv":
@@ -192,7 +192,7 @@ def list_targets(catalog_id: str, call: CallDep, paging: PagingDep) -> Listed[Ta
 def change_target_catalog(
     catalog_id: str, body: TargetCatalogPatch, call: CallDep
 ) -> TargetCatalogOut:
-    """Change the name of a catalogue, or what images of its targets earn.
+    """Change the name of a catalogue, or the rewards of its targets.
 
     Scenarios that use it keep their copy. `If-Match` takes the ETag of the catalogue.
     """
@@ -206,7 +206,7 @@ def change_target_catalog(
 
 
 def _set_rewards(session: Session, catalog_id: str, rewards: Mapping[str, float]) -> None:
-    """Give targets other rewards; all of them or none."""
+    """Give targets new rewards; all of them or none."""
     of_catalog = sa.select(TargetRow).where(TargetRow.catalog_id == catalog_id)
     ids, found = list(rewards), dict[str, TargetRow]()
     for first in range(0, len(ids), _AT_ONCE):

@@ -1,4 +1,4 @@
-"""Targets over all plans: open, planned, collected, delivered, expired or cancelled."""
+"""Targets across all plans: open, planned, collected, delivered, expired or cancelled."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def list_target_lives(
     state: Annotated[TargetState | None, Query(description="Only targets in this state.")] = None,
     catalog_id: Annotated[str | None, Query(description="Only targets of this catalogue.")] = None,
 ) -> Listed[TargetLifeOut]:
-    """List targets of the catalogues with how far they have come, catalogue by catalogue.
+    """List the targets of the catalogues with their states, catalogue by catalogue.
 
-    `planned`: a published plan has an image of it. `collected`: one was reported as taken.
-    `delivered`: and the contact that brings it down as executed. `expired`: it is past `due`.
-    `cancelled`: its catalogue was deleted. `open`: none of these.
+    `planned`: a published plan has an image of it. `collected`: an image was reported as taken.
+    `delivered`: the contact that downlinks it was reported as executed, too. `expired`: it is past
+    `due`. `cancelled`: its catalogue was deleted. `open`: none of these.
     """
     after = _after(paging.after)
     with call.database.reading() as session:

@@ -1,4 +1,4 @@
-"""What was done of a plan, and what its satellites tell: reports that are added, never changed."""
+"""Execution reports and telemetry of plans, which are added and never changed."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _bodies(schema: str, columns: str) -> dict[str, Any]:
     ),
 )
 def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceDep) -> ReportedOut:
-    """Report what became of actions. Reports are added, never changed: the last one counts."""
+    """Report outcomes of actions. Reports are added, never changed: the last one counts."""
     reports = _reports(call, data, ExecutionIn, ExecutionIn.model_fields, ("action_id", "outcome"))
     with once.transaction() as session:
         plan = find_plan(session, plan_id, call)
@@ -74,7 +74,7 @@ def report_executions(plan_id: str, data: RawBodyDep, call: CallDep, once: OnceD
 def take_down(
     session: Session, call: Call, plan: PlanRow, reports: Sequence[ExecutionIn], at: str = ""
 ) -> list[ExecutionRow]:
-    """Store what was reported of a plan that has been published; errors point from ``at`` on."""
+    """Store reports of a published plan; the pointers of errors begin with ``at``."""
     _require_published(plan)
     unknown = plan_store.unknown_actions(session, plan.id, [r.action_id for r in reports])
     faults = [
@@ -91,7 +91,7 @@ def take_down(
 
 @router.get("/{plan_id}/executions", responses=problem_responses(404))
 def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[ExecutionOut]:
-    """List what was reported of a plan, newest first."""
+    """List the execution reports of a plan, newest first."""
     with call.database.reading() as session:
         find_plan(session, plan_id, call)
         page = newest_first(session, plan_store.executions(plan_id), ExecutionRow.id, paging)
@@ -111,7 +111,7 @@ def list_executions(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[Ex
 def report_states(
     plan_id: str, data: RawBodyDep, call: CallDep, once: OnceDep
 ) -> StatesReportedOut:
-    """Add telemetry of the plan's satellites; replans go on from the newest of each."""
+    """Add telemetry of the plan's satellites; replans start from the newest state of each."""
     required = ("satellite_id", "at")
     states = _reports(call, data, StateIn, _STATE_COLUMNS, required, _nested, state_from)
     with once.transaction() as session:
@@ -135,7 +135,7 @@ def list_states(plan_id: str, call: CallDep, paging: PagingDep) -> Listed[PlanSt
 def faults_of_states(
     session: Session, plan: PlanRow, states: Sequence[StateIn], at: str
 ) -> list[Fault]:
-    """Return what states name that the plan does not have; pointers begin with ``at``."""
+    """Return the faults of states that name what the plan lacks; pointers begin with ``at``."""
     own = {row.satellite_id for row in plan_store.satellites(session, [plan.id])[plan.id]}
     faults = [
         Fault(code="unknown_satellite", pointer=f"{at}/{i}/satellite_id",
@@ -181,7 +181,7 @@ def _reports(
     of_row: Callable[[Record], Record] = lambda record: record,
     build: Callable[[B], object] = lambda body: body,
 ) -> list[B]:
-    """Return the reports of a body; raises with every fault and its place."""
+    """Return the reports of a body; raise an error with every fault and its place if any."""
     if file_type(call.request, data, *_TYPES) == "text/csv":
         found = read_csv(data, columns, required, most=MAX_REPORTED)
         records = tuple(map(of_row, found.records))
