@@ -18,7 +18,7 @@ BODY_WITHIN_S: Final = 300.0
 MOST_VALUES: Final = 1_000_000
 """Most objects and lists in a JSON body. An empty one takes two bytes, and eighty when parsed."""
 MOST_COMMAS: Final = 5_000_000
-"""Most commas between its values: a number takes two bytes, and thirty when parsed."""
+"""Most commas between the values in it: a number takes two bytes, and thirty when parsed."""
 
 _BEFORE_JSON: Final = b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n"
 """Byte-order marks and white space, in any encoding."""

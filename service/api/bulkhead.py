@@ -1,9 +1,9 @@
-"""A bulkhead between what is light and what is heavy.
+"""A bulkhead between light and heavy requests.
 
-Python runs one thread at a time, and parsing 32 MB holds it for seconds: who asks for what takes
-long, or gigabytes, would hold up everybody's polls. Such requests are passed on to a process of
-their own (``service.heavy``) whose memory is limited, a few at a time and of each owner, and its
-answers are passed back.
+Python runs one thread at a time, and parsing 32 MB occupies it for seconds: requests that take
+long, or gigabytes, would hold up everybody's polls. They are passed on to a separate process
+(``service.heavy``) with limited memory, a few at a time in all and for each owner, and its answers
+are passed back.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from service.process.logs import request_id
 from service.wire.scenarios import ScenarioIn
 
 LIGHT_BYTES: Final = 65_536
-"""Of a body that is read where polls are answered."""
+"""Largest body that is read in the process that answers polls."""
 LIGHT_TARGETS: Final = 5_000
-"""Of a scenario that is frozen there; a satellite counts as ten."""
+"""Most targets of a scenario that is frozen there; a satellite counts as ten."""
 
 _HEAVY: Final = re.compile(
     r"/v1/scenarios/[^/]+(/opportunities)?|/v1/jobs/[^/]+/(what-if|diff/.*|targets/.+/explanation)"
     r"|/v1/plans/[^/]+/(replans|changes|passes(\.[^/]*)?)|/v1/targets"
     r"|/stapi/orders(/.*)?|/stapi/products/[^/]+/opportunities"
 )
-# Decoders of binary files work where memory is limited, however short the file; a plan is read from
-# the whole timeline of its job.
+# Binary files, however short, are decoded where memory is limited; a plan is read from the whole
+# timeline of its job.
 _HEAVY_POSTS: Final = ("/v1/forecasts", "/v1/plans")
 _IS_LIGHT: Final = "slewline.is_light"
 _CALLER: Final = "x-slewline-caller"
@@ -54,11 +54,11 @@ _AGAIN_S: Final = 5
 
 
 class Heavy(Exception):
-    """What was asked for turns out to be too heavy to be done here; nothing is done yet."""
+    """The request turns out to be too heavy for this process; nothing has been done yet."""
 
 
 def require_light(request: Request, body: ScenarioIn, num_targets: int) -> None:
-    """Leave this request to the process for heavy ones, if there is one and it is large."""
+    """Raise ``Heavy`` if the request is large and there is a process for heavy ones."""
     is_large = num_targets + 10 * len(body.satellite_ids) > LIGHT_TARGETS
     if request.scope.get(_IS_LIGHT) and (is_large or body.forecast_id is not None):
         raise Heavy
@@ -70,7 +70,7 @@ class Bulkhead:
     Parameters
     ----------
     address
-        Socket file at which the process for heavy requests is reached.
+        Socket file of the process for heavy requests.
     """
 
     def __init__(self, app: ASGIApp, address: str):
@@ -115,7 +115,7 @@ class Bulkhead:
                 content=_body(receive),
                 extensions={"timeout": dict.fromkeys(("connect", "read", "write"), _WITHIN_S)},
             ) as answer:
-                # What metrics ask for of a route.
+                # The only attribute of a route that metrics read.
                 route = dict(answer.headers).get(_ROUTE, b"none").decode()
                 scope["route"] = SimpleNamespace(path_format=route)
                 headers = [pair for pair in answer.headers if pair[0].lower() not in _OF_ONE_HOP]
@@ -136,7 +136,7 @@ class Bulkhead:
 
 
 class Admitted:
-    """The other side: take the caller from the process that has let it in.
+    """The receiving side: take the caller from the process that admitted it.
 
     Only for a server that nobody else can reach.
     """
@@ -155,7 +155,7 @@ class Admitted:
         caller = Caller(**told | {"scope": KeyScope(told["scope"])})
         scope.setdefault("state", {}).update(caller=caller, request_id=own_id)
         request_id.set(own_id)
-        # Of the addresses in an answer: a proxy's word is taken at the door alone.
+        # For addresses in an answer: only the first process trusts a proxy's headers.
         scope["scheme"] = headers[_SCHEME]
 
         async def send_with_route(message: Message) -> None:
@@ -210,7 +210,7 @@ async def _body(receive: Receive) -> AsyncIterator[bytes]:
 
 
 def _again(kept: list[Message], receive: Receive) -> Receive:
-    """Return what gives the messages that were read, and then the others."""
+    """Return a ``receive`` that first repeats the messages that were read already."""
 
     async def receive_again() -> Message:
         return kept.pop(0) if kept else await receive()

@@ -1,4 +1,4 @@
-"""ETags name states: 304 where a client is up to date, 412 where it is not and should be."""
+"""ETags identify states: 304 if a client is up to date, 412 if it should be but is not."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ R = TypeVar("R")
 NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "`If-None-Match` names what there is: nothing has changed."}
 }
-"""For ``responses=`` of every route that may answer so."""
+"""For ``responses=`` of every route that may answer 304."""
 
 
 def etag_of(text: str) -> str:
@@ -64,7 +64,7 @@ def readable(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 def known_as(call: Call, etag: str) -> Response | None:
-    """Give the answer this ETag; return 304 where ``If-None-Match`` names it, else None."""
+    """Give the answer this ETag; return 304 if ``If-None-Match`` names it, else None."""
     call.response.headers["ETag"] = etag
     is_known = matches(call.request.headers.get("if-none-match"), etag)
     return Response(status_code=304, headers={"ETag": etag}) if is_known else None
@@ -73,19 +73,19 @@ def known_as(call: Call, etag: str) -> Response | None:
 def sent(
     request: Request, content: str | bytes, media_type: str, headers: Mapping[str, str]
 ) -> Response:
-    """Return a content, or 304 where ``If-None-Match`` names the ETag among its headers."""
+    """Return the content, or 304 if ``If-None-Match`` names the ETag among its headers."""
     if matches(request.headers.get("if-none-match"), headers["ETag"]):
         return Response(status_code=304, headers=headers)
     return Response(content, media_type=media_type, headers=headers)
 
 
 def unless_known(call: Call, model: M) -> M | Response:
-    """Return the model with its ETag, or 304 where ``If-None-Match`` names that ETag."""
+    """Return the model with its ETag, or 304 if ``If-None-Match`` names that ETag."""
     return known_as(call, etagged(model)) or model
 
 
 def matched(call: Call, row: R, show: Callable[[R], BaseModel]) -> R:
-    """Return a row that is to change; 412 where ``If-Match`` names another state than it shows.
+    """Return a row that is to change; 412 if ``If-Match`` names another state than its own.
 
     Call it in the transaction of the change, with the row locked.
     """
@@ -95,7 +95,7 @@ def matched(call: Call, row: R, show: Callable[[R], BaseModel]) -> R:
 
 
 def require_match(call: Call, etag: str) -> None:
-    """Refuse a change (412) where ``If-Match`` names another state than that of this ETag."""
+    """Refuse a change (412) if ``If-Match`` does not name this ETag."""
     asked = call.request.headers.get("if-match")
     if asked is not None and not matches_strongly(asked, etag):
         raise ServiceError(
@@ -106,6 +106,6 @@ def require_match(call: Call, etag: str) -> None:
 
 
 def located(call: Call, model: M, location: str) -> M:
-    """Return the model of something new or changed, with its ``Location`` and ETag."""
+    """Return the model of something new or changed; set its ``Location`` and ETag."""
     call.response.headers.update({"Location": location, "ETag": etagged(model)})
     return model

@@ -1,4 +1,4 @@
-"""What a route asks the application for, and what every call is checked for."""
+"""Dependencies of routes on the application, and checks of every call."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ T = TypeVar("T")
 W = TypeVar("W", bound=Owned)
 
 ANY_FILE: Final = "application/octet-stream"
-"""A file of any form that a call takes. Generated clients can often send nothing else."""
+"""A file of any form that a call accepts. Generated clients can often send nothing else."""
 
 # What needs no thread is async: FastAPI runs everything else in one, which costs more than the
 # work itself.
@@ -47,7 +47,7 @@ RawBodyDep = Annotated[bytes, Depends(_raw_body)]
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A request under way: who asks, what it reaches, and the headers of its answer."""
+    """A request under way: its caller, the application's parts, and the headers of its answer."""
 
     request: Request
     response: Response
@@ -58,7 +58,7 @@ class Call:
     audit: Audit
 
     def count_stored(self, session: Session, *, num_rows: int = 0, num_bytes: int = 0) -> None:
-        """Count what is stored for the caller; 403 ``quota_exceeded`` where it is too much."""
+        """Count what is stored for the caller; 403 ``quota_exceeded`` if it is too much."""
         owner, settings = self.caller.owner, self.settings
         usage = usage_store.used(session, owner)
         if num_rows or num_bytes:
@@ -67,7 +67,7 @@ class Call:
 
     @contextmanager
     def noted(self, action: str, kind: str, own_id: str) -> Iterator[Session]:
-        """Yield a session that may write; its transaction also notes who did what to what."""
+        """Yield a session that may write; its transaction also records an audit event."""
         with self.database.transaction() as session:
             yield session
             self.audit.record(session, action, kind, own_id)
@@ -75,13 +75,13 @@ class Call:
     def own(
         self, session: Session, table: type[W], what: str, own_id: str, *, to_change: bool = False
     ) -> W:
-        """Return a thing that the caller may see; 404 where there is none, in these words."""
+        """Return a row that the caller may see; 404, naming ``what`` it is, if there is none."""
         row = find_own(session, table, own_id, self.caller.visible_owner, to_change=to_change)
         return found(row, what, own_id)
 
 
 def found(thing: T | None, what: str, own_id: str) -> T:
-    """Return what was looked for; 404 where there is none, in these words."""
+    """Return ``thing``; 404, naming ``what`` it is, if it is None."""
     if thing is None:
         raise no_such(what, own_id)
     return thing
@@ -102,7 +102,7 @@ async def admin_only(call: CallDep) -> None:
 
 
 async def own_job_only(call: CallDep) -> None:
-    """Let a caller reach only jobs of its own: for it there are no others (404)."""
+    """Let a caller reach only its own jobs: for others, answer 404."""
     job_id = call.request.path_params.get("job_id")
     owner = call.caller.visible_owner
     if job_id is None or owner is None:
@@ -112,7 +112,7 @@ async def own_job_only(call: CallDep) -> None:
 
 
 def require_media_type(request: Request, *allowed: str) -> str:
-    """Return the media type of the body; 415 where it is none of these."""
+    """Return the media type of the body; 415 if it is none of these."""
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if media_type not in allowed:
         said = media_type or "missing"
@@ -125,7 +125,7 @@ def require_media_type(request: Request, *allowed: str) -> str:
 
 
 def file_type(request: Request, data: bytes, *allowed: str) -> str:
-    """Return the media type of a file: 415 where it is none of these; bytes tell it themselves."""
+    """Return a file's media type, detected if sent as ``ANY_FILE``; 415 if it is none of these."""
     kind = require_media_type(request, *allowed, ANY_FILE)
     return media_type_told(data, allowed) if kind == ANY_FILE else kind
 

@@ -1,4 +1,4 @@
-"""Satellites' orbits as Orbit Mean-Elements Messages: files that the import takes back."""
+"""Satellites' orbits as OMM and OEM files, which the import accepts."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def get_all_omm(suffix: Suffix, call: CallDep) -> Response:
 
     Satellites whose orbit is an ephemeris are left out.
 
-    `POST /v1/satellites/import` takes the file back, with the media type that it comes in.
+    `POST /v1/satellites/import` accepts the file under the media type of this answer.
     """
     require_offered(suffix, _FORMS, _OFFERED)
     with call.database.reading() as session:

@@ -54,16 +54,16 @@ def create_forecast(
     call: CallDep,
     data: RawBodyDep,
     once: OnceDep,
-    name: Annotated[Name | None, Query(description="For people.")] = None,
+    name: Annotated[Name | None, Query(description="Name for people.")] = None,
     default_clear_probability: Annotated[
         float | None,
-        Query(ge=0, le=1, description="Of targets and instants that the file does not cover."),
+        Query(ge=0, le=1, description="For targets and instants that the file does not cover."),
     ] = None,
 ) -> ForecastOut:
-    """Store a forecast, whole or not at all. It is its owner's alone.
+    """Store a forecast, whole or not at all. Only its owner sees it.
 
-    Scenarios that name it take along what it says of their targets, so that deleting it, or
-    uploading the next one, changes no stored question.
+    Scenarios that name it copy its values for their targets, so that deleting it, or uploading
+    the next one, does not change them.
     """
     kind = file_type(call.request, data, _CSV, *_NETCDF)
     field, notes = read_csv(data) if kind == _CSV else read_netcdf(data)
@@ -95,14 +95,14 @@ def list_forecasts(call: CallDep, paging: PagingDep) -> Listed[ForecastOut]:
 
 @router.get("/{forecast_id}", response_model=ForecastOut, responses=readable())
 def get_forecast(forecast_id: str, call: CallDep) -> ForecastOut | Response:
-    """Return what is known of one forecast, without its values."""
+    """Return the description of one forecast, without its values."""
     with call.database.reading() as session:
         return unless_known(call, _shown(call.own(session, ForecastRow, "forecast", forecast_id)))
 
 
 @router.delete("/{forecast_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_forecast(forecast_id: str, call: CallDep) -> None:
-    """Delete a forecast. Scenarios that use it keep what it said of their targets."""
+    """Delete a forecast. Scenarios that use it keep its values for their targets."""
     with call.noted("delete", "forecast", forecast_id) as session:
         row = matched(call, call.own(session, ForecastRow, "forecast", forecast_id), _shown)
         session.delete(row)

@@ -63,12 +63,12 @@ def create_ground_station(body: GroundStationIn, once: OnceDep) -> GroundStation
 def import_ground_stations(
     call: CallDep, data: RawBodyDep, once: OnceDep, on_error: OnErrorQuery = OnError.SKIP
 ) -> Imported[ImportedStation]:
-    """Store the stations of a file. A station whose name is known gets the figures of the file.
+    """Store the stations of a file. A station whose name is stored gets the figures of the file.
 
-    Where several stations have one name, only one that is stored just so counts as known.
+    If several stations share a name, none is updated: those with new figures are created.
 
-    CSV: `lat`, `latitude`, `lon`, `lng` and `longitude` are taken as well. GeoJSON: the
-    properties that are fields of a station count, others are ignored.
+    CSV: `lat`, `latitude`, `lon`, `lng` and `longitude` are accepted as well. GeoJSON: properties
+    that are no fields of a station are ignored.
     """
     kind = file_type(call.request, data, *_IMPORT_TYPES)
     good, faults = read_stations(kind, data)
@@ -155,7 +155,7 @@ def _add(session: Session, body: GroundStationIn) -> GroundStationRow:
 def _store(session: Session, good: list[Checked[GroundStationIn]]) -> list[ImportedStation]:
     stored = session.scalars(alive(GroundStationRow)).all()
     known = {from_store(GroundStationIn, row.body).model_dump_json(): row for row in stored}
-    # A name that is there twice, or twice in the file, says nothing about which station is meant.
+    # A name that is stored twice, or occurs twice in the file, does not identify a station.
     of_file = Counter(one.body.name for one in good)
     of_store = Counter(row.name for row in stored)
     by_name = {row.name: row for row in stored if of_store[row.name] == 1 == of_file[row.name]}

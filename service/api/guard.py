@@ -1,4 +1,4 @@
-"""The door: each request is given its caller, or refused, before its body is read."""
+"""Access control: each request is given its caller, or refused, before its body is read."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ OPEN: Final = (
     "/health", "/version", "/docs", "/openapi.json", "/problems",
     "/new", "/jobs", "/comparisons", "/static",
 )  # fmt: skip
-"""What anybody may read, with all below it: the dashboard's pages get their data by calls."""
+"""Paths that anybody may read, with all below: the dashboard's pages get their data by calls."""
 
 MOST_AT_ONCE: Final = 512
 MOST_OF_AN_OWNER: Final = 256
-"""Requests under way, streams and waits among them. Connections leave room for others."""
+"""Most requests under way, in all and of one owner, streams and waits included. Idle connections
+make room for others (``service.process.connections``)."""
 
 _UNLIMITED: Final = "/health"
 
@@ -43,15 +44,15 @@ def is_open(path: str) -> bool:
 
 
 def is_limited(path: str) -> bool:
-    """Return whether requests to a path are counted: a health check must never be refused."""
+    """Return whether requests to a path are limited: a health check must never be refused."""
     return not _is_below(path, _UNLIMITED)
 
 
 class Guard:
     """Find each request's caller and put it into ``request.state.caller``.
 
-    Reading asks for the scope `read`, every other method for `submit`: a new route is guarded
-    without anybody thinking of it. What asks for more says so itself (``deps.admin_only``).
+    Reading needs the scope `read`, every other method `submit`, so that new routes are guarded by
+    default. Routes that need more declare it (``deps.admin_only``).
     """
 
     def __init__(self, app: ASGIApp, settings: Settings):
@@ -64,7 +65,7 @@ class Guard:
         self._limiter = RateLimiter(per_s, settings.rate_limit_burst) if per_s else None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, or raise what refuses it."""
+        """Serve one request, or raise the error that refuses it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -85,7 +86,7 @@ class Guard:
         try:
             caller = await self._caller(request)
         except ServiceError:
-            # A wrong key counts as well, or it could be guessed at any speed.
+            # Wrong keys count as well; otherwise keys could be guessed at any speed.
             self._count(request, NOBODY)
             raise
         self._count(request, caller)
@@ -127,7 +128,7 @@ class Guard:
 
 
 def require_scope(caller: Caller, needed: KeyScope) -> None:
-    """Raise 403 ``insufficient_scope`` where the caller's scope does not include this one."""
+    """Raise 403 ``insufficient_scope`` if the caller's scope does not include this one."""
     if caller.scope.includes(needed):
         return
     challenge = f'Bearer realm="slewline", error="insufficient_scope", scope="{needed}"'

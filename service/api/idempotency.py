@@ -1,4 +1,4 @@
-"""``Idempotency-Key``: a request that is sent again gets the answer of the first time."""
+"""``Idempotency-Key``: a repeated request gets the answer of the first one."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from service.stores.idempotency_store import KeptAnswer, Keyed
 
 M = TypeVar("M", bound=BaseModel)
 
-# Those of an answer that belong to what was created; the others are of one exchange.
+# The headers that belong to what was created; the others concern a single exchange.
 _KEPT_HEADERS: Final = ("location", "etag", "retry-after")
 
 
 class AlreadyAnswered(Exception):
-    """The request came before; this is what it was answered."""
+    """The request was sent before and got this answer."""
 
     def __init__(self, answer: KeptAnswer):
         super().__init__(answer.status)
@@ -34,10 +34,10 @@ class AlreadyAnswered(Exception):
 
 
 class Once:
-    """Lets a request that creates something do so once for each key.
+    """Lets a request that creates something do so only once for each key.
 
     A route opens its transaction with ``transaction`` and passes its answer through ``keep``
-    before that ends. Refused requests keep nothing: their key can be used again.
+    before the transaction ends. Refused requests store no answer: their key can be used again.
     """
 
     def __init__(self, call: Call, keyed: Keyed | None):
@@ -45,13 +45,13 @@ class Once:
         self._keyed = keyed
 
     def find(self) -> None:
-        """Raise ``AlreadyAnswered`` where the request is a repeated one."""
+        """Raise ``AlreadyAnswered`` if the request is a repeated one."""
         with self._call.database.reading() as session:
             self._require_first(session, store.find)
 
     @contextmanager
     def transaction(self) -> Iterator[Session]:
-        """Yield a session that may write, in which the key is this request's."""
+        """Yield a session that may write, after claiming the key for this request."""
         with self._call.database.transaction() as session:
             self._require_first(session, store.claim)
             yield session
@@ -70,7 +70,7 @@ class Once:
     def created(
         self, session: Session, kind: str, own_id: str, model: M, shown_once: Collection[str] = ()
     ) -> M:
-        """Return a new thing of the collection that was called, noted, kept, told where it is."""
+        """Audit a new item of the called collection, keep the answer and return it with headers."""
         self._call.audit.record(session, "create", kind, own_id)
         location = f"{self._call.request.url.path}/{own_id}"
         return self.keep(session, located(self._call, model, location), shown_once)
@@ -81,7 +81,7 @@ class Once:
         Parameters
         ----------
         shown_once
-            Fields that are kept, and shown to who sends the request again, as null.
+            Fields that are null in the stored answer, and so for whoever repeats the request.
         """
         if self._keyed is not None:
             response, route = self._call.response, self._call.request.scope["route"]
@@ -104,7 +104,7 @@ async def _once(
             min_length=1,
             max_length=255,
             pattern=r"^[\x21-\x7e]+$",
-            description="A name of your choice for this request. Sent again with the same body, "
+            description="A key of your choice for this request. If sent again with the same body, "
             "it creates nothing and gets the stored answer, with `Idempotency-Replayed: true`.",
         ),
     ] = None,
@@ -118,7 +118,7 @@ async def _once(
         keep_s=call.settings.idempotency_hours * 3600.0,
     )
     once = Once(call, keyed)
-    # What a repeated request names may be gone by now: it is answered before that is looked up.
+    # A repeated request is answered before what it names is looked up, which may be gone by now.
     await run_in_threadpool(once.find)
     return once
 
@@ -127,7 +127,7 @@ OnceDep = Annotated[Once, Depends(_once)]
 
 
 def install_replay(app: FastAPI) -> None:
-    """Answer repeated requests with what they were answered first."""
+    """Answer repeated requests with the first answer."""
     app.exception_handler(AlreadyAnswered)(_replay)
 
 

@@ -1,4 +1,4 @@
-"""What all imports share: the answer's shape, and when a file is refused as a whole."""
+"""Common parts of imports: the answer's shape, and when a file is refused as a whole."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BYTES: Final[dict[str, Any]] = {
     "format": "binary",
     "description": "A file of any of these forms; its content tells which.",
 }
-"""The schema of a file that tells its form itself."""
+"""The schema of a file whose form is detected from its content."""
 
 T = TypeVar("T")
 
@@ -36,7 +36,7 @@ OnErrorQuery = Annotated[
 
 
 def refuse_if_asked(accepted: int, faults: Sequence[Fault], on_error: OnError) -> None:
-    """Raise 422 where nothing is acceptable, or something is wrong and all was asked for."""
+    """Raise 422 if no record is good, or if any is bad and ``on_error`` is ``reject_all``."""
     if faults and (not accepted or on_error is OnError.REJECT_ALL):
         raise refuse(faults)
 
@@ -59,7 +59,7 @@ def _placed(fault: Fault) -> str:
 
 def body_schemas(examples: Mapping[str, str]) -> dict[str, Any]:
     """Return OpenAPI's ``requestBody`` for files: media type to description."""
-    # Generators of clients cannot tell a list from a file.
+    # Client generators cannot distinguish a list from a file.
     schemas = {
         kind: {"type": "object" if kind.endswith("json") else "string", "description": text}
         for kind, text in examples.items()

@@ -1,4 +1,4 @@
-"""From what a client sends to stored jobs."""
+"""The way from what a client sends to stored jobs."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ _QUEUE_FULL_S: Final = 30
 
 
 def described(call: Call, scenario_id: str, sha256: str) -> Described:
-    """Return a scenario and its opportunities; 503 where to compute them takes long."""
+    """Return a scenario and its opportunities; 503 if computing them takes long."""
     reader: OpportunityReader = call.request.app.state.opportunities
     return reader.get(call.database, scenario_id, sha256)
 
 
 def queue_of(request: Request) -> JobQueue:
-    """Return the queue; 503 where this server has none."""
+    """Return the queue; 503 if this server has none."""
     queue: JobQueue | None = request.app.state.queue
     if queue is None:
         raise ServiceError("not_live", "This server takes no jobs: it has no queue.")
@@ -55,9 +55,9 @@ def queue_of(request: Request) -> JobQueue:
 
 
 def queue_with_room(call: Call, num_jobs: int = 1) -> JobQueue:
-    """Return the queue; 503 where it is full: before there is any work, and without a lock.
+    """Return the queue; 503 if it is full, which is checked before any work and without a lock.
 
-    ``require_room`` has the last word, in the transaction that stores the jobs.
+    ``require_room`` decides, in the transaction that stores the jobs.
     """
     queue = queue_of(call.request)
     with call.database.reading() as session:
@@ -66,12 +66,12 @@ def queue_with_room(call: Call, num_jobs: int = 1) -> JobQueue:
 
 
 def asked_for(body: JobIn | ReplanIn, call: Call) -> partial[JobSpec]:
-    """Return the spec of a job as far as its body says it: all but the scenario.
+    """Return the spec of a job, which its body gives except for the scenario.
 
     Raises
     ------
     ServiceError
-        Where parameters or limits are wrong, before anything is stored.
+        If parameters or limits are wrong, before anything is stored.
     """
     return partial(
         JobSpec,
@@ -86,12 +86,12 @@ def asked_for(body: JobIn | ReplanIn, call: Call) -> partial[JobSpec]:
 
 
 def all_params(solver: str, params: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a solver's parameters, defaults filled in; a planner's error where they are wrong."""
+    """Return a solver's parameters with defaults; raise a ``PlannerError`` if they are wrong."""
     return params_of(parse_params(solver_class(solver), params))
 
 
 def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
-    """Return the inline scenario of a body, ready to be stored; None where it names one."""
+    """Return the inline scenario of a body, ready to be stored; None if it names a stored one."""
     scenario, limits = body.scenario, call.settings.scenario_limits
     if (scenario is None) == (body.scenario_id is None):
         detail = "Give either scenario_id or scenario."
@@ -108,7 +108,7 @@ def frozen(call: Call, body: QuestionIn) -> FrozenScenario | None:
 
 
 def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
-    """Return a question over what is stored, ready to be stored: here, where it is not large."""
+    """Return a question, ready to be stored; raise ``Heavy`` if another process must freeze it."""
     with call.database.reading() as session:
         num_targets = freezing.num_targets(session, body.target_catalog_ids)
     bulkhead.require_light(call.request, body, num_targets)
@@ -119,9 +119,9 @@ def freeze(call: Call, body: ScenarioIn) -> FrozenScenario:
 def save(
     session: Session, call: Call, frozen: FrozenScenario, owner: str | None = None
 ) -> tuple[ScenarioRow, bool]:
-    """Return the stored scenario of this content, and whether it is new, and then the caller's.
+    """Store a scenario unless its content is stored already; return its row and whether it is new.
 
-    With an ``owner`` it is seen by that one alone.
+    A new one counts as stored by the caller. With an ``owner``, only that owner sees it.
     """
     row, is_new = freezing.save(session, frozen, owner)
     if is_new:
@@ -144,7 +144,7 @@ def stored_scenario(
 
 
 def limits_of(limits: LimitsIn, settings: Settings) -> dict[str, float]:
-    """Return seconds and megabytes that a job may use, the server's where nothing is said."""
+    """Return the seconds and megabytes that a job may use, by default the server's."""
     time_s = settings.default_time_s if limits.time_s is None else limits.time_s
     if time_s > settings.max_time_s:
         detail = f"{time_s:g} s is more than the {settings.max_time_s:g} s that a job may take."
@@ -157,7 +157,7 @@ def limits_of(limits: LimitsIn, settings: Settings) -> dict[str, float]:
 
 
 def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
-    """Refuse more jobs than the queue may hold, in all and of one owner, or whose owner is full."""
+    """Refuse more jobs than the queue may hold, in all and of one owner, or beyond a quota."""
     settings = call.settings
     call.count_stored(session)
     most = (settings.max_queued, settings.max_queued_per_tenant)
@@ -172,22 +172,22 @@ def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
 
 
 def find_job(session: Session, job_id: str) -> JobRow:
-    """Return a job; 404 where there is none."""
+    """Return a job; 404 if there is none."""
     return found(session.get(JobRow, job_id), "job", job_id)
 
 
 def require_answer(session: Session, job: JobRow) -> datetime:
-    """Return when a job's answer was stored; 409 where it has none."""
+    """Return when a job's answer was stored; 409 if it has none."""
     return _left_by(job, answer_store.answered_at(session, job.id))
 
 
 def find_timeline(session: Session, job: JobRow) -> str:
-    """Return a job's timeline as JSON text; 409 where there is none."""
+    """Return a job's timeline as JSON text; 409 if there is none."""
     return _left_by(job, answer_store.timeline_of(session, job.id))
 
 
 def _left_by(job: JobRow, answer: T | None) -> T:
-    """Return what a job has left; 409 where that is nothing, yet or for good."""
+    """Return a job's answer; 409 if it has none, be it not yet or never."""
     if answer is not None:
         return answer
     if job.state in ACTIVE:
@@ -203,7 +203,7 @@ def shown_job(session: Session, job: JobRow) -> JobOut:
 
 
 def queued(session: Session, call: Call, once: Once, queue: JobQueue, spec: JobSpec) -> JobOut:
-    """Queue a job; return it, and tell where to follow it."""
+    """Queue a job; return it, with headers that say where to follow it."""
     job = submit(session, queue, spec)
     call.audit.record(session, "create", "job", job.id)
     call.response.headers.update({"Location": f"/v1/jobs/{job.id}"} | headers_of(job))

@@ -1,4 +1,4 @@
-"""What is asked about a job's plan: why a target is in it or not, what differs, and what if."""
+"""Questions about a job's plan: explanations of targets, differences to others, what-ifs."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ _CHANGE: Final = set(ChangeIn.model_fields)
 
 
 @router.get(
-    # Ids of targets may hold slashes.
+    # Ids of targets may contain slashes.
     "/{job_id}/targets/{target_id:path}/explanation",
     response_model=ExplanationOut,
     responses=readable(409, 503),
 )
 def get_explanation(
     job_id: str,
-    target_id: Annotated[str, Path(description="Percent-encoded, slashes too.")],
+    target_id: Annotated[str, Path(description="Percent-encoded, including slashes.")],
     call: CallDep,
 ) -> ExplanationOut | Response:
-    """Explain one target, opportunity by opportunity: what it breaks, displaces and earns.
+    """Explain one target: what each of its opportunities would break, displace and earn.
 
-    It is worked out when it is asked for, which may take a while: 503 with `Retry-After` asks
-    to come back.
+    The answer is computed on request, which may take a while: 503 with `Retry-After` asks to try
+    again later.
     """
     with call.database.reading() as session:
         job = intake.find_job(session, job_id)
@@ -68,8 +68,8 @@ def get_explanation(
 def get_diff(job_id: str, other_id: str, call: CallDep) -> DiffOut | Response:
     """Compare the plans of two jobs: actions added, removed and moved, and the totals.
 
-    Plans of different questions are compared as well, by the ids of satellites, targets and
-    stations; `questions_differ_in` says so.
+    Plans of different questions can be compared as well, by the ids of satellites, targets and
+    stations; `questions_differ_in` says how the questions differ.
     """
     with call.database.reading() as session:
         if call.caller.visible_owner not in (None, store.owner_of(session, other_id)):
@@ -112,7 +112,7 @@ def _differences(first: TimelineOut, second: TimelineOut) -> tuple[Difference, .
 
 
 class _Names:
-    """What the timelines call satellites, targets and stations."""
+    """The names of satellites, targets and stations in the timelines."""
 
     def __init__(self, *timelines: TimelineOut):
         self._satellites = {s.id: s.name for t in timelines for s in t.satellites}
@@ -138,13 +138,13 @@ class _Names:
 
 @router.post("/{job_id}/what-if", status_code=202, responses=problem_responses(404, 409, 503))
 def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) -> JobOut:
-    """Queue the question of a job with a change, as a scenario and a job of their own.
+    """Queue the question of a job with a change, as a new scenario and a new job.
 
-    `links.what_if_of` leads to the job, `change` repeats what was asked, and
-    `GET /v1/jobs/{job_id}/diff/{other_id}` tells what came of it. A target is forced by the
-    image that the job's plan holds, or by the one that costs that plan least. What cannot be is
-    refused with its place in the body; working that out may take a while: 503 with
-    `Retry-After` asks to come back.
+    `links.what_if_of` names the original job, `change` repeats the request, and
+    `GET /v1/jobs/{job_id}/diff/{other_id}` shows the effect. A forced target is imaged as in the
+    job's plan, or else by the image that costs that plan least. An impossible change is refused
+    with its place in the body. Checking this may take a while: 503 with `Retry-After` asks to try
+    again later.
     """
     queue = intake.queue_with_room(call)
     with call.database.reading() as session:
@@ -180,7 +180,7 @@ def create_what_if(job_id: str, body: WhatIfIn, call: CallDep, once: OnceDep) ->
 
 
 def _solver(job: JobRow, body: WhatIfIn) -> tuple[str, dict[str, Any]]:
-    """Return the solver and all its parameters: those of the job belong to its solver."""
+    """Return the solver and all its parameters; those of the job apply only to its own solver."""
     solver = body.solver or job.solver
     if body.params is None and solver == job.solver:
         return solver, dict(job.params)

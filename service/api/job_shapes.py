@@ -1,4 +1,4 @@
-"""What clients see of jobs, and when they had better ask again."""
+"""Jobs as clients see them, and when clients should ask again."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ def headers_of(job: JobRow | sa.Row[Any]) -> dict[str, str]:
 
 
 def seconds_until(state: str, created_at: datetime) -> int | None:
-    """Return what ``Retry-After`` says of a job; None where it has ended.
+    """Return the ``Retry-After`` of a job in seconds; None if it has ended.
 
-    A job that has waited long will not start in this second: to ask after a fifth of what it has
-    waited costs little time, and spares the service most calls of those who follow a long queue.
+    A job that has waited long will hardly start within a second: asking after a fifth of the time
+    that it has waited delays clients little, and spares the service most calls of a long queue.
 
     >>> from datetime import timedelta
     >>> ago = [datetime.now(UTC) - timedelta(seconds=waited_s) for waited_s in (0, 16, 600)]
@@ -68,7 +68,7 @@ def seconds_until(state: str, created_at: datetime) -> int | None:
         return None
     if state != "queued":
         return SOON_S
-    # The clock is the database's there and ours here: a second matters little.
+    # One time is by the database's clock, the other by ours: a second matters little.
     waited_s = (datetime.now(UTC) - created_at).total_seconds()
     return min(_LATEST_S, max(SOON_S, int(_SHARE * waited_s)))
 

@@ -1,4 +1,4 @@
-"""The OpenAPI document, and the page that shows it without the internet."""
+"""The OpenAPI document, and a page that shows it without internet access."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SENTENCE = re.compile(r"(.+?)\.(?:\s+|$)(.*)", re.DOTALL)
 _CREATING = ("200", "201", "202")
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
-# What each of these answers says about itself, and which request header brings it about.
+# Headers of all answers and of these statuses, and the request headers that lead to the latter.
 _ON_EVERY_ANSWER = {"X-Request-ID": "Names this request in the logs and in problem documents."}
 _ANSWER_HEADERS = {
     "201": {"Location": "Address of what was created.", "ETag": "Of its present form."},
@@ -65,7 +65,7 @@ _KEYS = {
 def install_openapi(app: FastAPI) -> None:
     """Make ``app.openapi()`` return the document with every error response declared.
 
-    It takes seconds to build, once: only what runs in a thread may ask for it.
+    Building it takes seconds, once: call it only in a thread.
     """
     building = Lock()
 
@@ -82,7 +82,7 @@ def install_openapi(app: FastAPI) -> None:
                 )
             return app.openapi_schema
 
-    # As FastAPI's documentation has it.
+    # As FastAPI's documentation recommends.
     app.openapi = document  # type: ignore[method-assign]
 
 
@@ -120,7 +120,7 @@ def _with_problems(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _summarise(operation: dict[str, Any]) -> None:
-    """Take the first sentence of the description as the summary, which was a function's name."""
+    """Replace the summary, a function's name, with the first sentence of the description."""
     if found := _SENTENCE.match(operation.get("description", "")):
         first, rest = found.groups()
         operation["summary"] = " ".join(first.split())
@@ -128,7 +128,7 @@ def _summarise(operation: dict[str, Any]) -> None:
 
 
 def _add_links(document: dict[str, Any]) -> None:
-    """Link each creating call to every call whose only further need is the new thing's id."""
+    """Link each creating call to every call that needs only the id of what was created."""
     paths = document["paths"]
     for path, operations in paths.items():
         if "post" not in operations:
@@ -148,7 +148,7 @@ def _add_links(document: dict[str, Any]) -> None:
 
 
 def _below(collection: str, paths: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return the paths that begin with one thing of a collection, and what its id is called."""
+    """Return the paths of one item of a collection, each with the name of the id's parameter."""
     found = []
     for path in paths:
         root, slot, _ = path.partition("/{")
@@ -163,7 +163,7 @@ def _text(description: str) -> dict[str, Any]:
 
 @router.get("/openapi.json", name="openapi")
 def openapi_json(request: Request) -> JSONResponse:
-    """Return the document. FastAPI's own route builds it where every request has to wait."""
+    """Return the document. FastAPI's own route would build it in the event loop."""
     return JSONResponse(request.app.openapi())
 
 

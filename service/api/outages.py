@@ -1,4 +1,4 @@
-"""Outages of satellites and ground stations, which scenarios of their span take along."""
+"""Outages of satellites and ground stations, which are copied into scenarios that they overlap."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ router = APIRouter(prefix="/v1/outages", tags=["outages"])
 def create_outage(body: OutageIn, once: OnceDep) -> OutageOut:
     """Report that a satellite or a ground station is out for a while.
 
-    Scenarios stored from now on whose horizon it touches take it along, and name it.
+    Scenarios stored from now on include it, with its id, if it overlaps their horizon.
     """
     with once.transaction() as session:
         satellite_ids = _alive(session, SatelliteRow, body.satellite_id)
@@ -49,9 +49,9 @@ def list_outages(
     satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
     station_id: Annotated[str | None, Query(description="Only of this station.")] = None,
     from_: Annotated[
-        Instant | None, Query(alias="from", description="Only those that end after it.")
+        Instant | None, Query(alias="from", description="Only those that end after this.")
     ] = None,
-    to: Annotated[Instant | None, Query(description="Only those that begin before it.")] = None,
+    to: Annotated[Instant | None, Query(description="Only those that begin before this.")] = None,
 ) -> Listed[OutageOut]:
     """List the outages, newest first."""
     own = with_values(OutageRow, satellite_id=satellite_id, station_id=station_id)
@@ -71,7 +71,7 @@ def get_outage(outage_id: str, call: CallDep) -> OutageOut | Response:
 
 @router.delete("/{outage_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_outage(outage_id: str, call: CallDep) -> None:
-    """Delete an outage, as where it ends early. Scenarios that took it along keep it."""
+    """Delete an outage, for example if it ends early. Scenarios that include it keep it."""
     with call.noted("delete", "outage", outage_id) as session:
         row = existing(session, OutageRow, "outage", outage_id, to_change=True)
         matched(call, row, lambda row: _shown(session, [row])[0])
@@ -81,7 +81,7 @@ def delete_outage(outage_id: str, call: CallDep) -> None:
 def _alive(
     session: Session, table: type[SatelliteRow] | type[GroundStationRow], own_id: str | None
 ) -> set[str]:
-    """Return the id, where something of it is stored."""
+    """Return the id, if it is that of a stored row."""
     return set() if own_id is None or find(session, table, own_id) is None else {own_id}
 
 

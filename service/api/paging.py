@@ -1,4 +1,4 @@
-"""Lists: cursors, a limit, a Link header to the next page, and what they are narrowed by."""
+"""Lists: cursors, a limit, a Link header to the next page, and filters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 MOST_BYTES: Final = 2_000_000
-"""Of a page whose rows may be large; one row more, where a single one is larger."""
+"""Largest page of rows that may be large; a page holds at least one row, whatever its size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Page(Generic[R]):
 
 @dataclass(frozen=True, slots=True)
 class Paging:
-    """What the client asked for. ``after`` is the key of the last row it has."""
+    """The page that the client asked for. ``after`` is the key of the last row it has."""
 
     limit: int
     after: str | None
@@ -65,7 +65,7 @@ class Paging:
 
 
 def decode_cursor(cursor: str) -> str:
-    """Return the key of a cursor; 422 ``invalid_cursor`` where it is none."""
+    """Return the key of a cursor; 422 ``invalid_cursor`` if it is malformed."""
     try:
         padded = cursor + "=" * (-len(cursor) % 4)
         key = base64.b64decode(padded, altchars=b"-_", validate=True).decode("ascii")
@@ -77,7 +77,7 @@ def decode_cursor(cursor: str) -> str:
 
 
 def invalid_cursor() -> ServiceError:
-    """Return what a cursor of another list is refused with."""
+    """Return the error for a cursor that this list has not given."""
     return ServiceError("invalid_cursor", "The cursor is not one that this list has given.")
 
 
@@ -85,7 +85,7 @@ async def _paging(
     request: Request,
     response: Response,
     cursor: Annotated[
-        str | None, Query(description="`next` of the page before.", max_length=200)
+        str | None, Query(description="`next` of the previous page.", max_length=200)
     ] = None,
     limit: Annotated[int, Query(ge=1, le=500, description="Most items on a page.")] = 50,
 ) -> Paging:
@@ -108,7 +108,7 @@ def newest_first(
     Parameters
     ----------
     weight
-        What a row adds to the answer, in bytes, where that may be much: the page ends early.
+        Bytes that a row adds to the answer, if these may be many: the page may then end early.
     """
     if paging.after is not None:
         statement = statement.where(key < paging.after)
@@ -141,29 +141,29 @@ def _num_fitting(weights: Iterable[int], most: int) -> int:
 
 
 SatelliteQuery = Annotated[
-    str | None, Query(max_length=200, description="Only with this satellite, by its id.")
+    str | None, Query(max_length=200, description="Only with this satellite (its id).")
 ]
 StationQuery = Annotated[
-    str | None, Query(max_length=200, description="Only with this ground station, by its id.")
+    str | None, Query(max_length=200, description="Only with this ground station (its id).")
 ]
 NameQuery = Annotated[
-    str | None, Query(max_length=200, description="Only names that hold this text, in any case.")
+    str | None, Query(max_length=200, description="Only names with this text, in any case.")
 ]
 _From = Annotated[
     Instant | None, Query(alias="from", description="Only what was stored then or later.")
 ]
-_To = Annotated[Instant | None, Query(description="Only what was stored before.")]
+_To = Annotated[Instant | None, Query(description="Only what was stored before then.")]
 
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """When things were stored: from an instant on, and before another."""
+    """A span of storage times: from an instant on, and before another."""
 
     start: datetime | None
     end: datetime | None
 
     def narrow(self, query: sa.Select[Any], column: sa.SQLColumnExpression[Any]) -> sa.Select[Any]:
-        """Return a query of what was stored then."""
+        """Return a query narrowed to what was stored in this span."""
         if self.start is not None:
             query = query.where(column >= self.start)
         if self.end is not None:
@@ -181,5 +181,5 @@ StoredDep = Annotated[Stored, Depends(_stored)]
 def by_name(
     query: sa.Select[Any], column: sa.SQLColumnExpression[Any], name: str | None
 ) -> sa.Select[Any]:
-    """Return a query of what has this text in its name."""
+    """Return a query narrowed to names that contain this text."""
     return query if name is None else query.where(column.icontains(name, autoescape=True))

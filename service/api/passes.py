@@ -1,4 +1,4 @@
-"""Passes of a plan: who is over which station when, and what comes down."""
+"""Passes of a plan's satellites over its stations, and the data that they downlink."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def _filter(
     station_id: Annotated[str | None, Query(description="Only of this station.")] = None,
     satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
     from_: Annotated[
-        Instant | None, Query(alias="from", description="Only passes that end after it.")
+        Instant | None, Query(alias="from", description="Only passes that end after this.")
     ] = None,
-    to: Annotated[Instant | None, Query(description="Only passes that begin before it.")] = None,
+    to: Annotated[Instant | None, Query(description="Only passes that begin before this.")] = None,
     planned: Annotated[
         bool | None, Query(description="Only passes with a contact, or only those without.")
     ] = None,
@@ -57,7 +57,7 @@ FilterDep = Annotated[PassFilter, Depends(_filter)]
 def list_passes(
     plan_id: str, call: CallDep, paging: PagingDep, wanted: FilterDep
 ) -> Listed[PassOut]:
-    """List the passes of a plan's satellites over its stations by AOS, planned or not."""
+    """List the passes of a plan's satellites over its stations in order of AOS, planned or not."""
     after = paging.after_number()
     numbered = list(enumerate(_find(call, plan_id, wanted)[0]))[after + 1 :]
     page = paging.answer(numbered[: paging.limit + 1], lambda pair: pair[0])

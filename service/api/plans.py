@@ -1,4 +1,4 @@
-"""Plans with a life: taken from a job, approved, published, and reported on."""
+"""The life cycle of plans: taken from a job, approved, published, and reported on."""
 
 from __future__ import annotations
 
@@ -70,12 +70,12 @@ def list_plans(
         Query(description="Only plans in force at this instant; `now` for the present one."),
     ] = None,
     job_id: Annotated[str | None, Query(description="Only plans of this job.")] = None,
-    parent_id: Annotated[str | None, Query(description="Only changes of this plan.")] = None,
+    parent_id: Annotated[str | None, Query(description="Only replans of this plan.")] = None,
 ) -> Listed[PlanOut]:
     """List plans, newest first.
 
-    `state=published&at=now` is the stable link to what is in force; with an instant, plans that
-    were superseded later are listed for the time before that.
+    `state=published&at=now` is the stable link to the plans in force. With an instant, plans that
+    were in force then are listed even if they have been superseded since.
     """
     with call.database.reading() as session:
         query = plan_store.matching(
@@ -108,7 +108,7 @@ def get_plan(plan_id: str, call: CallDep) -> PlanOut | Response:
 
 @router.delete("/{plan_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_plan(plan_id: str, call: CallDep) -> None:
-    """Delete a plan for good: not an approved or published one, nor one that has changes."""
+    """Delete a plan permanently, unless it is approved or published or has replans."""
     with call.noted("delete", "plan", plan_id) as session:
         plan = find_plan(session, plan_id, call, to_change=True)
         matched(call, plan, partial(_shown, session))
@@ -119,16 +119,15 @@ def delete_plan(plan_id: str, call: CallDep) -> None:
 def move_plan(plan_id: str, body: TransitionIn, call: CallDep, once: OnceDep) -> PlanOut:
     """Approve, publish or withdraw a plan.
 
-    Publishing supersedes what is in force for the plan's satellites from `effective_from` on. It is
-    refused (409) where somebody has published another plan there since this one was approved,
-    unless this one is its change. Approval takes the scope `approve`, and a waiver for each
-    violation.
+    Publishing supersedes the plans in force for its satellites from `effective_from` on. It is
+    refused (409) if another plan was published there since this one was approved, unless this one
+    is a replan of it. Approval needs the scope `approve`, and waivers for all violations.
     """
     if body.to == "approved":
         require_scope(call.caller, Scope.APPROVE)
     with once.transaction() as session:
         if body.to == "published":
-            # Before the plan itself is locked, so that two publishers come one after the other.
+            # Before the plan itself is locked, so that two publications run one after the other.
             plan_store.lock_publishing(session, find_plan(session, plan_id, call).owner)
         plan = find_plan(session, plan_id, call, to_change=True)
         matched(call, plan, partial(_shown, session))
@@ -155,7 +154,7 @@ def list_actions(
     paging: PagingDep,
     satellite_id: Annotated[str | None, Query(description="Only of this satellite.")] = None,
 ) -> Listed[PlanActionOut]:
-    """List a plan's collects and contacts, and what became of them as far as it was reported."""
+    """List a plan's collects and contacts, with their outcomes if reported."""
     with call.database.reading() as session:
         find_plan(session, plan_id, call)
         found = plan_store.actions(
@@ -169,14 +168,14 @@ def list_actions(
     "/{plan_id}/timeline.{suffix}", response_class=Response, responses=timeline_responses(FORMS)
 )
 def get_plan_as(plan_id: str, suffix: Suffix, call: CallDep) -> Response:
-    """Return the plan in the form that the suffix names, as of its job."""
+    """Return the timeline of the plan's job in the form that the suffix names."""
     with call.database.reading() as session:
         job = session.get_one(JobRow, find_plan(session, plan_id, call).job_id)
     return timeline_answer(call, job, suffix)
 
 
 def find_plan(session: Session, plan_id: str, call: Call, *, to_change: bool = False) -> PlanRow:
-    """Return a plan; 404 where there is none that the caller may see."""
+    """Return a plan; 404 if there is none that the caller may see."""
     return call.own(session, PlanRow, "plan", plan_id, to_change=to_change)
 
 
@@ -208,5 +207,5 @@ def _plan_out(plan: PlanRow, satellites: list[PlanSatelliteRow]) -> PlanOut:
 
 
 def action_out(row: PlanActionRow, outcome: str | None) -> PlanActionOut:
-    """Return an action, and what became of it."""
+    """Return an action with its outcome."""
     return from_row(PlanActionOut, row, id=row.action_id, outcome=outcome)

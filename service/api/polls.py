@@ -1,4 +1,4 @@
-"""Polls of jobs and timelines, most requests of dashboards, answered before the routes."""
+"""Polls of jobs and timelines, the most frequent requests, answered before the routes."""
 
 from __future__ import annotations
 

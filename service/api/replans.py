@@ -40,16 +40,16 @@ from service.wire.scenarios import FileSatellite, ScenarioFile
 router = APIRouter(prefix="/v1/plans", tags=["plans"])
 
 _WIDEST_TURN_DEG = 180.0
-_NEAR_S = 1.0  # as base actions are matched
+_NEAR_S = 1.0  # the tolerance with which base actions are matched
 
 
 @router.post("/{plan_id}/replans", status_code=202, responses=problem_responses(404, 409, 422, 503))
 def create_replan(plan_id: str, body: ReplanIn, call: CallDep, once: OnceDep) -> JobOut:
-    """Queue the plan that follows this one: what starts before `freeze_until` stays as it is.
+    """Queue a replan of this plan: actions that start before `freeze_until` stay as they are.
 
-    The job's scenario is that of the plan with what happened: outages, reports, other targets.
+    The job's scenario is that of the plan with what happened: outages, reports, changed targets.
     As few actions as possible change; promised targets stay imaged, or the job fails with
-    `promise_not_kept`. `links.plan` is the draft, there once the job has succeeded.
+    `promise_not_kept`. `links.plan` is the draft, which exists once the job has succeeded.
     """
     job = intake.asked_for(body, call)
     queue = intake.queue_with_room(call)
@@ -112,7 +112,7 @@ def _happened(
 def _telemetry(
     session: Session, plan: PlanRow, body: ReplanIn, file: ScenarioFile, now: datetime
 ) -> dict[str, StateIn]:
-    """Return the newest state of each satellite, where it is newer than the one it began with."""
+    """Return each satellite's newest state, if it is no older than the one the plan began with."""
     faults = faults_of_states(session, plan, body.states, "/states")
     faults += [
         Fault(code="value_out_of_range", detail="A state cannot be of later than now.",
@@ -132,14 +132,14 @@ def _telemetry(
 
 
 def _newest(session: Session, satellite_ids: Sequence[str]) -> dict[str, FileSatellite]:
-    """Return the satellites with their elements of today, those that are still stored."""
+    """Return the satellites that are still stored, with their elements of today."""
     rows = session.scalars(alive(SatelliteRow).where(SatelliteRow.id.in_(satellite_ids)))
     return {str(one.id): one for one in freezing.satellites_of(session, [row.id for row in rows])}
 
 
 @router.get("/{plan_id}/changes", responses=problem_responses(404))
 def list_changes(plan_id: str, call: CallDep) -> PlanChangesOut:
-    """List what a replan has changed after its freeze, and why; nothing of any other plan."""
+    """List what a replan has changed after its freeze, and why; empty for any other plan."""
     with call.database.reading() as session:
         plan = find_plan(session, plan_id, call)
         job = session.get_one(JobRow, plan.job_id)
@@ -169,7 +169,7 @@ def list_changes(plan_id: str, call: CallDep) -> PlanChangesOut:
 
 
 def planned(row: PlanActionRow) -> PlannedAction:
-    """Return an action in the terms that all plans share."""
+    """Return an action in the form that all plans share."""
     return PlannedAction(
         start=row.start,
         end=row.end,
@@ -180,7 +180,7 @@ def planned(row: PlanActionRow) -> PlannedAction:
 
 
 def _is_lost(question: StoredQuestion, action: PlannedAction) -> bool:
-    """Return whether an outage, a failure or a dropped target took an action of the plan."""
+    """Return whether an outage, a failure or a dropped target rules out an action of the plan."""
     if action.mode == "collect" and action.site_id in question.pins.forbid:
         return True
     is_in_base = question.replan is not None and any(

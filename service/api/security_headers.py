@@ -1,4 +1,4 @@
-"""Headers that keep browsers from doing with an answer what it is not meant for."""
+"""Headers that keep browsers from using an answer in ways it is not meant for."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ SECURITY_HEADERS: Final = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
 }
-"""On every answer, unless it brings its own, as a page with styles must."""
+"""Set on every answer, unless it has its own, as a page with styles must."""
 
 _RAW: Final = [(n.lower().encode(), v.encode()) for n, v in SECURITY_HEADERS.items()]
-# Kept by nobody but who asked, who may use it again only when its ETag still holds.
+# Only the client that asked may cache it, and reuse it only while its ETag is valid.
 _PRIVATE: Final = (b"cache-control", b"private, no-cache")
 _PERSONAL: Final = "/v1/"
 

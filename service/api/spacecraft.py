@@ -1,4 +1,4 @@
-"""Spacecraft types: those that are built in, and one's own."""
+"""Spacecraft types: built-in ones, and those stored by users."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from service.wire.spacecraft_types import BUILT_IN, filled
 from service.wire.stored import from_row
 
 _ANY_PERIOD_S: Final = 5700.0
-"""Presets follow the period of the orbit, which a type does not know; all are valid in any."""
+"""Presets depend on the orbit's period, which a type does not have; they are valid for any."""
 
 router = APIRouter(prefix="/v1/spacecraft", tags=["spacecraft"])
 
@@ -43,7 +43,7 @@ def create_spacecraft(body: SpacecraftIn, once: OnceDep) -> SpacecraftOut:
 
 @router.get("")
 def list_spacecraft(call: CallDep, paging: PagingDep) -> Listed[SpacecraftOut]:
-    """List the types: one's own, newest first; on the last page those that are built in as well."""
+    """List the stored types, newest first, followed by the built-in ones on the last page."""
     with call.database.reading() as session:
         page = newest_first(session, alive(SpacecraftRow), SpacecraftRow.id, paging)
     built_in = [_built_in(name) for name in BUILT_IN] if page.next is None else []
@@ -52,7 +52,7 @@ def list_spacecraft(call: CallDep, paging: PagingDep) -> Listed[SpacecraftOut]:
 
 @router.get("/{spacecraft_id}", response_model=SpacecraftOut, responses=readable())
 def get_spacecraft(spacecraft_id: str, call: CallDep) -> SpacecraftOut | Response:
-    """Return one type, by its id or the name of one that is built in."""
+    """Return one type, by its id or built-in name."""
     if spacecraft_id in BUILT_IN:
         return unless_known(call, _built_in(spacecraft_id))
     with call.database.reading() as session:
@@ -61,7 +61,7 @@ def get_spacecraft(spacecraft_id: str, call: CallDep) -> SpacecraftOut | Respons
 
 @router.patch("/{spacecraft_id}", responses=problem_responses(404, 409, 412))
 def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) -> SpacecraftOut:
-    """Change a type of one's own. Satellites made from it stay as they are.
+    """Change a stored type. Satellites made from it stay as they are.
 
     `If-Match` takes the ETag of the type.
     """
@@ -81,7 +81,7 @@ def change_spacecraft(spacecraft_id: str, body: SpacecraftPatch, call: CallDep) 
 
 @router.delete("/{spacecraft_id}", status_code=204, responses=problem_responses(404, 409, 412))
 def delete_spacecraft(spacecraft_id: str, call: CallDep) -> None:
-    """Delete a type of one's own. Satellites made from it stay as they are."""
+    """Delete a stored type. Satellites made from it stay as they are."""
     with call.noted("delete", "spacecraft", spacecraft_id) as session:
         row = matched(call, _find(session, spacecraft_id, to_change=True), _shown)
         row.delete()

@@ -1,7 +1,7 @@
-"""STAPI, the sensor tasking interface, by the community's library `stapi-fastapi`.
+"""STAPI, the sensor tasking interface, with the community's library `stapi-fastapi`.
 
-The library has a router for each product, made when the process starts. Spacecraft types come and
-go, so that one router serves them all: its product is a template, whose id is a path parameter.
+The library makes a router for each product when the process starts. Spacecraft types come and go,
+so one router serves them all: its product is a template, whose id is a path parameter.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ from service.problems.kinds import ServiceError
 
 PREFIX: Final = "/stapi"
 MOST_BYTES: Final = 16_384
-"""Of a body: a point, a span and a few numbers."""
+"""Largest body: a point, a span and a few numbers."""
 _MOST_ON_A_PAGE: Final = 100
 
 
 async def _check_call(call: CallDep) -> None:
-    """Refuse what the library would fail at, and keep the call for it."""
+    """Refuse requests that the library would fail on, and keep the call for later steps."""
     request = call.request
     request.state.call = call
     try:
@@ -71,7 +71,7 @@ async def _check_product(product_id: str, request: Request, call: CallDep) -> No
 
 
 class _Products(ProductRouter):
-    """The router of all products: what it shows is the one that was found."""
+    """The router of all products; it shows the product that was found for the request."""
 
     @staticmethod
     def url_for(request: Request, name: str, /, **path_params: Any) -> URL:
@@ -85,7 +85,7 @@ class _Products(ProductRouter):
 
 
 class _Root(RootRouter):
-    """The library's root, with products that are looked up."""
+    """The library's root router, with products that are looked up."""
 
     def __init__(self, template: Product, **kwargs: Any):
         super().__init__(**kwargs)
@@ -112,7 +112,7 @@ class _Root(RootRouter):
         return ProductsCollection(products=shown, links=links)
 
 
-# What the library calls. It has the body's own models; those that were checked are in the request.
+# Called by the library, with its own models of a body; the checked ones are in the request.
 
 
 async def _search(
@@ -153,7 +153,7 @@ async def _get_order(order_id: str, request: Request) -> ResultE[Maybe[Order[Ord
 async def _get_order_statuses(
     order_id: str, _next: str | None, _limit: int, request: Request
 ) -> ResultE[Maybe[tuple[list[OrderStatus], Maybe[str]]]]:
-    # There are four at most: they are one page.
+    # There are at most four, which fit on one page.
     found = await run_in_threadpool(backend.statuses, request.state.call, order_id)
     return Success(Some((found, Nothing)))
 

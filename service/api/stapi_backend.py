@@ -1,4 +1,4 @@
-"""What STAPI's calls do: products, opportunities and orders over what is stored."""
+"""The operations behind STAPI's calls: products, opportunities and orders."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _WHY = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """A product: a spacecraft type that satellites are of."""
+    """A product: a spacecraft type that has satellites."""
 
     shown: ProductShown
     sensor_type: str | None
@@ -56,7 +56,7 @@ def products(call: Call) -> list[Found]:
 
 
 def find_product(call: Call, product_id: str) -> Found:
-    """Return one product; 404 where no satellite is of this type."""
+    """Return one product; 404 if no satellite is of this type."""
     with call.database.reading() as session:
         product = _product(session, product_id) if product_id in types_flown(session) else None
     return found(product, "product", product_id)
@@ -79,12 +79,12 @@ def _product(session: Session, type_id: str) -> Found | None:
 
 
 def search(call: Call, product: Found, asked: SearchIn) -> tuple[list[Opportunity[Any, Any]], int]:
-    """Return a page of the opportunities of a place, and how many there are."""
+    """Return a page of the opportunities of a point, and their total number."""
     start, end = asked.span
     target = FileTarget.model_validate(_target(asked, new_id(), product).model_dump())
     with call.database.reading() as session:
         fleet = fleet_of(session, product.shown.id)
-    if not fleet:  # the last satellite went a moment ago
+    if not fleet:  # the last satellite was deleted a moment ago
         raise no_such("product", product.shown.id)
     described = views_of(fleet, target, start, end, call.settings.scenario_limits)
     first = int(asked.next or 0)
@@ -122,7 +122,7 @@ def _target(asked: SearchIn | OrderIn, own_id: str, product: Found) -> TargetIn:
     try:
         target = TargetIn.model_validate(body)
     except ValidationError as error:
-        # The pointer would be into a target, which nobody sent.
+        # The pointers would be into a target, which the client did not send.
         faults = faults_of_validation(error, body)
         raise refuse([Fault(code=one.code, detail=one.detail) for one in faults]) from None
     target_from(target)
@@ -143,7 +143,7 @@ def create_order(call: Call, product: Found, asked: OrderIn) -> Order[OrderStatu
 def list_orders(
     call: Call, after: str | None, limit: int
 ) -> tuple[list[Order[OrderStatus]], str | None, int]:
-    """Return a page of the caller's orders, newest first, the id to go on after, how many."""
+    """Return a page of the caller's orders, newest first, its last id if more follow, the total."""
     wanted = sa.select(OrderRow).where(of_owner(OrderRow.owner, call.caller.visible_owner))
     with call.database.reading() as session:
         count = session.scalar(sa.select(sa.func.count()).select_from(wanted.subquery())) or 0

@@ -1,7 +1,7 @@
-"""What STAPI's searches and orders say, in bounds that the library does not set.
+"""Bodies of STAPI's searches and orders, with limits that the library does not set.
 
-The library takes any geometry and any CQL2 filter, however deep. These models are asked first, and
-take what a target can say.
+The library accepts any geometry and any CQL2 filter, however deep. These models are checked first,
+and accept what a target can express.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ LIMITS: Final[dict[tuple[str, str], str]] = {
     ("sun_elevation_deg", ">="): "sun_elevation_min_deg",
     ("sun_elevation_deg", "<="): "sun_elevation_max_deg",
 }
-"""The limit of a target that a comparison sets."""
+"""The limit of a target that each comparison sets."""
 
 
 Span = tuple[datetime, datetime]
 
 
 class StapiQueryables(Queryables):
-    """What a filter may compare, with <= or >=, several of them joined by "and"."""
+    """Properties that a filter may compare with <= or >=, several of them joined by "and"."""
 
     off_nadir_deg: Angle | None = Field(None, description="At the satellite.")
     elevation_deg: Angle | None = Field(None, description="At the target; >= only.")
@@ -42,14 +42,14 @@ class StapiQueryables(Queryables):
 
 
 class StapiOrderParameters(OrderParameters):
-    """What an order may say beside place, time and filter."""
+    """Parameters of an order besides point, time and filter."""
 
     reward: NonNegative = Field(1.0, description="What an image earns: its priority.")
     collect_s: Duration = Field(30.0, description="How long one image takes.")
 
 
 class StapiOpportunity(OpportunityProperties):
-    """An access of one satellite to the place. Angles hold at its middle."""
+    """An access of one satellite to the point. Angles are those at its middle."""
 
     satellite_id: str
     satellite_name: str
@@ -105,12 +105,12 @@ class _AskIn(Body):
         return _span(self.datetime)
 
     def as_target(self, own_id: str, **fields: Any) -> dict[str, Any]:
-        """Return the fields of the target that this place, span and filter make.
+        """Return the fields of the target with this point, span and filter.
 
         Raises
         ------
         ServiceError
-            The filter compares what no target limits.
+            If the filter compares what no target limits.
         """
         lon_deg, lat_deg, *above = self.geometry.coordinates
         start, end = self.span

@@ -1,4 +1,4 @@
-"""What a job found: its timeline in several forms, its proof, and what became of each target."""
+"""The results of a job: its timeline in several forms, its proof, and the targets' outcomes."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
     }
     if _JSON in (form.media_type for form in forms):
         other = [{"type": "array", "items": {"type": "object"}}, {"type": "object"}]
-        # Generated clients take all of these as text, whatever the suffix asks for.
+        # Generated clients treat all of these as text, whatever the suffix.
         del content[_JSON]
         content[_JSON] = {"schema": {"anyOf": [_TIMELINE, *other]}}
     name = {"description": "A name to save it under.", "schema": {"type": "string"}}
@@ -75,9 +75,9 @@ def timeline_responses(forms: Sequence[Form]) -> dict[int | str, dict[str, Any]]
     responses=timeline_responses(list(_BY_TYPE.values())),
 )
 def get_timeline(job_id: str, call: CallDep) -> Response:
-    """Return the plan, judged: actions, resources, totals, violations.
+    """Return the plan as judged by the referee: actions, resources, totals, violations.
 
-    `Accept` chooses the form. The suffixes of the next call do too, and offer some more.
+    `Accept` chooses the form. The call with a suffix offers further forms.
     """
     media_type = preferred(call.request.headers.get("accept"), [_JSON, *_BY_TYPE])
     with call.database.reading() as session:
@@ -113,10 +113,10 @@ def timeline_answer(call: Call, job: JobRow, suffix: str) -> Response:
     },
 )
 def get_proof(job_id: str, call: CallDep) -> Response:
-    """Return what proves the bound of the timeline, or `null` where it has none.
+    """Return the proof of the timeline's bound, or `null` if it has none.
 
     `proof` names the argument and `value` the bound. `prices` holds a multiplier for each
-    target, in the order of the scenario: the dual function at these prices is the bound.
+    target, in the order of the scenario: the dual function at these multipliers is the bound.
     """
     with call.database.reading() as session:
         job = intake.find_job(session, job_id)
@@ -133,7 +133,7 @@ def list_outcomes(
     call: CallDep,
     paging: PagingDep,
     outcome: Annotated[Outcome | None, Query(description="Only this outcome.")] = None,
-    reason: Annotated[str | None, Query(description="Only this code of a reason.")] = None,
+    reason: Annotated[str | None, Query(description="Only this reason's code.")] = None,
     target_id: Annotated[str | None, Query(description="Only this target.")] = None,
 ) -> Listed[TargetItem]:
     """List every target of the scenario once, with its outcome and why it was left out."""
@@ -164,7 +164,7 @@ def _answer(call: Call, job: JobRow, form: Form | None) -> Response:
     """Return a timeline in a form, or as the document itself."""
     suffix, etag = "json", etag_of_timeline(job.id)
     if form is not None:
-        # How it is written may change with the version of the service.
+        # The content of a form may change with the version of the service.
         suffix, etag = form.suffix, f'"{job.id}-{form.suffix}-{planner_core.__version__}"'
     headers = {
         "ETag": etag,

@@ -1,4 +1,4 @@
-"""Many who ask the same kind of question at about the same time, answered by one query."""
+"""Batched queries: requests for the same kind of answer at the same time share one query."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ _MOST_KEYS: Final = 500
 
 
 class Together(Generic[K, T]):
-    """Gathers what is asked for while a query runs, and asks for it all with the next one.
+    """Gathers the keys that are asked for while a query runs, and queries them all in the next.
 
     No answer is older than its question: the query that answers it begins after it was asked.
-    Whoever asks alone does not wait. The more have shared a query, the longer is the pause before
-    the next one: many clients cost no more than ten queries a second.
+    A single request does not wait. The more requests have shared a query, the longer the pause
+    before the next one: many clients cost no more than ten queries a second.
 
     For one event loop; the queries run in a thread of their own, one at a time.
 
     Parameters
     ----------
     ask
-        Returns what there is of these keys, which are all different.
+        Returns what is found for these keys, which are all different.
     longest_pause_s
-        0 for what nobody should wait for longer than the query before takes.
+        0 if nobody should wait for longer than the previous query takes.
     """
 
     def __init__(
@@ -40,16 +40,16 @@ class Together(Generic[K, T]):
     ):
         self._ask = ask
         self._longest_pause_s = longest_pause_s
-        # The loop's own executor costs less than Starlette's, which can be cancelled.
+        # The loop's ``run_in_executor`` costs less than Starlette's, which can be cancelled.
         self._thread = ThreadPoolExecutor(1, "together")
         self._is_asking = asyncio.Lock()
         self._gathering: tuple[list[K], asyncio.Task[Mapping[K, T]]] | None = None
         self._not_before_s = 0.0
 
     async def get(self, key: K) -> T | None:
-        """Return what there is of a key now, or None; raises what the query raises."""
+        """Return what is found for a key now, or None; raise what the query raises."""
         if self._is_idle:
-            # Alone, and no task need be made for others to wait for.
+            # A single request: no task is needed for others to wait for.
             async with self._is_asking:
                 loop = asyncio.get_running_loop()
                 return (await loop.run_in_executor(self._thread, self._ask, [key])).get(key)
@@ -58,7 +58,7 @@ class Together(Generic[K, T]):
             self._gathering = keys, asyncio.create_task(self._answer(keys))
         keys, answers = self._gathering
         keys.append(key)
-        # A client that goes away must not take the answer of the others along.
+        # A client that disconnects must not cancel the answer of the others.
         return (await asyncio.shield(answers)).get(key)
 
     @property
@@ -78,8 +78,8 @@ class Together(Generic[K, T]):
             return await loop.run_in_executor(self._thread, self._ask_in_parts, different)
 
     def _ask_in_parts(self, keys: Sequence[K]) -> Mapping[K, T]:
-        # A query has room for so many parameters. More than one part is rare: many keys at once
-        # means that the database did not answer for a while.
+        # A query has a limited number of parameters. More than one part is rare: so many keys at
+        # once mean that the database did not answer for a while.
         answers: dict[K, T] = {}
         for first in range(0, len(keys), _MOST_KEYS):
             answers |= self._ask(keys[first : first + _MOST_KEYS])

@@ -1,4 +1,4 @@
-"""Webhooks: where the ends of jobs are told, and what was sent there."""
+"""Webhooks: addresses that get events of jobs and plans, and the messages sent to them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _SECRET_BYTES: Final = 32
 
 @router.post("", status_code=201)
 def create_webhook(body: WebhookIn, call: CallDep, once: OnceDep) -> CreatedWebhook:
-    """Tell an address of this owner's jobs and plans; the answer holds the signing secret."""
+    """Send events of the owner's jobs and plans to a URL; the answer has the signing secret."""
     try:
         require_good_url(body.url, private=call.settings.webhook_private_addresses)
     except AddressRefused as error:
@@ -82,7 +82,7 @@ def get_webhook(webhook_id: str, call: CallDep) -> WebhookOut | Response:
 
 @router.delete("/{webhook_id}", status_code=204, responses=problem_responses(404, 412))
 def delete_webhook(webhook_id: str, call: CallDep) -> None:
-    """Delete a webhook and all that was or was to be sent to it."""
+    """Delete a webhook and all its deliveries, including those still to be sent."""
     with call.noted("delete", "webhook", webhook_id) as session:
         row = matched(call, _find(session, webhook_id, call, to_change=True), _shown)
         sent = WebhookDeliveryRow.webhook_id == webhook_id
@@ -92,7 +92,7 @@ def delete_webhook(webhook_id: str, call: CallDep) -> None:
 
 @router.post("/{webhook_id}/test", status_code=202, responses=problem_responses(404, 409))
 def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
-    """Send an event of type `test`; the deliveries tell how it fared."""
+    """Send an event of type `test`; the list of deliveries shows the result."""
     with once.transaction() as session:
         row = _find(session, webhook_id, call)
         _require_enabled(row)
@@ -110,7 +110,7 @@ def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
 
 @router.get("/{webhook_id}/deliveries", responses=problem_responses(404))
 def list_deliveries(webhook_id: str, call: CallDep, paging: PagingDep) -> Listed[DeliveryOut]:
-    """List what was sent, newest first. Those that ended 30 days ago are forgotten."""
+    """List the deliveries, newest first. They are deleted 30 days after they have ended."""
     query = sa.select(WebhookDeliveryRow).where(WebhookDeliveryRow.webhook_id == webhook_id)
     with call.database.reading() as session:
         _find(session, webhook_id, call)
@@ -124,7 +124,7 @@ def list_deliveries(webhook_id: str, call: CallDep, paging: PagingDep) -> Listed
     responses=problem_responses(404, 409),
 )
 def redeliver(webhook_id: str, delivery_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
-    """Send a message again, under a new `webhook-id`, whatever became of the first."""
+    """Send a message again, under a new `webhook-id`, whatever the result of the first."""
     with once.transaction() as session:
         row = _find(session, webhook_id, call)
         _require_enabled(row)
