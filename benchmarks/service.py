@@ -31,7 +31,7 @@ from service.client import Client
 from service.commands import demo_mission
 from service.commands.demo import create_mission
 from service.db.ids import new_id
-from service.db.rows import JobBlockRow, JobResultRow, JobRow
+from service.db.rows import JobChunkRow, JobResultRow, JobRow
 from service.db.session import Database
 from service.wire.base import dumped, parse_instant
 from service.wire.instants import instant_text
@@ -235,7 +235,7 @@ def many_jobs(service: Served, mission: Json) -> None:
 def copy_job(database: Database, job_id: str, copies: int) -> None:
     with database.transaction() as session:
         ids = [new_id() for _ in range(copies)]
-        for kind, key in ((JobRow, "id"), (JobResultRow, "job_id"), (JobBlockRow, "job_id")):
+        for kind, key in ((JobRow, "id"), (JobResultRow, "job_id"), (JobChunkRow, "job_id")):
             table = kind.__table__
             found = session.execute(sa.select(table).where(table.c[key] == job_id)).mappings().all()
             changes = {"label": "stored"} if kind is JobRow else {}

@@ -9,7 +9,7 @@ from datetime import datetime
 from functools import wraps
 from typing import ParamSpec
 
-from service.answers.blocks import (
+from service.answers.chunks import (
     Document,
     Entry,
     batches,
@@ -25,14 +25,14 @@ __all__ = ["Answered", "Document", "chunked", "compact", "in_chunks", "listed"]
 P = ParamSpec("P")
 
 Texts = Callable[[Iterable[Entry]], Iterator[tuple[Entry, str]]]
-"""Yields blocks with their texts."""
+"""Yields chunks with their texts."""
 
 _CHUNK = 1 << 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Satellite:
-    """Id and name, the blocks of its actions, and those of the fields after them."""
+    """Id and name, the chunks of its actions, and those of the fields after them."""
 
     about: Document
     entries: list[Entry]
@@ -47,7 +47,7 @@ class Answered:
     contents
         The table of contents of its answer.
     texts
-        Reads blocks.
+        Reads chunks.
     content
         The frozen question: a canonical scenario file.
 

@@ -1,4 +1,4 @@
-"""Answers of jobs, written and read block by block."""
+"""Answers of jobs, written and read chunk by chunk."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any, Final
 import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
-from service.answers.blocks import TIMELINE, Block, Entry, Kind, batches, contents_of
+from service.answers.chunks import TIMELINE, Chunk, Entry, Kind, batches, contents_of
 from service.db.clock import utc_now
-from service.db.rows import JobBlockRow, JobResultRow
+from service.db.rows import JobChunkRow, JobResultRow
 
 _AT_ONCE: Final = 1 << 17
 """Characters per statement that reads or writes."""
@@ -23,7 +23,7 @@ _TOLD: Final = ("position", "kind", "first", "num_items", "size")
 
 
 def save(
-    session: Session, job_id: str, blocks: Sequence[Block], figures: Mapping[str, Any] | None
+    session: Session, job_id: str, chunks: Sequence[Chunk], figures: Mapping[str, Any] | None
 ) -> None:
     """Store the answer of a job."""
     session.execute(
@@ -33,14 +33,14 @@ def save(
             created_at=utc_now(),
         )
     )
-    for some in batches(contents_of(blocks), _SIZE, _AT_ONCE):
+    for some in batches(contents_of(chunks), _SIZE, _AT_ONCE):
         rows = [
             {name: getattr(entry, name) for name in _TOLD}
             | {"job_id": job_id, "tally": dict(entry.tally) or None}
-            | {"text": blocks[entry.position].text}
+            | {"text": chunks[entry.position].text}
             for entry in some
         ]
-        session.execute(sa.insert(JobBlockRow), rows)
+        session.execute(sa.insert(JobChunkRow), rows)
 
 
 def answered_at(session: Session, job_id: str) -> datetime | None:
@@ -49,8 +49,8 @@ def answered_at(session: Session, job_id: str) -> datetime | None:
 
 
 def contents(session: Session, job_id: str, *kinds: Kind) -> list[Entry]:
-    """Return the blocks of these kinds in the table of contents of a job's answer."""
-    row = JobBlockRow
+    """Return the chunks of these kinds in the table of contents of a job's answer."""
+    row = JobChunkRow
     columns = [getattr(row, name) for name in _TOLD]
     wanted = sa.select(row.tally, *columns).where(row.job_id == job_id, row.kind.in_(kinds))
     return [
@@ -62,15 +62,15 @@ def contents(session: Session, job_id: str, *kinds: Kind) -> list[Entry]:
 def texts(
     reading: Callable[[], AbstractContextManager[Session]], job_id: str, entries: Iterable[Entry]
 ) -> Iterator[tuple[Entry, str]]:
-    """Yield blocks with their texts, a few at a time.
+    """Yield chunks with their texts, a few at a time.
 
     Each batch is read in a transaction of its own, so that a slow reader keeps no connection
     from others; this is safe because answers never change.
     """
     for some in batches(entries, _SIZE, _AT_ONCE):
-        wanted = sa.select(JobBlockRow.position, JobBlockRow.text).where(
-            JobBlockRow.job_id == job_id,
-            JobBlockRow.position.in_([entry.position for entry in some]),
+        wanted = sa.select(JobChunkRow.position, JobChunkRow.text).where(
+            JobChunkRow.job_id == job_id,
+            JobChunkRow.position.in_([entry.position for entry in some]),
         )
         with reading() as session:
             found = {row.position: row.text for row in session.execute(wanted)}
@@ -89,7 +89,7 @@ def proof_of(session: Session, job_id: str) -> str | None:
 
 
 def _whole(session: Session, job_id: str, *kinds: Kind) -> str | None:
-    wanted = sa.select(JobBlockRow.text).where(
-        JobBlockRow.job_id == job_id, JobBlockRow.kind.in_(kinds)
+    wanted = sa.select(JobChunkRow.text).where(
+        JobChunkRow.job_id == job_id, JobChunkRow.kind.in_(kinds)
     )
-    return "".join(session.scalars(wanted.order_by(JobBlockRow.position))) or None
+    return "".join(session.scalars(wanted.order_by(JobChunkRow.position))) or None

@@ -37,17 +37,17 @@ _CREATING = ("200", "201", "202")
 _ALWAYS = (422, 500, 503)
 _WITH_BODY = (413, 415)
 # Headers of all answers and of these statuses, and the request headers that lead to the latter.
-_ON_EVERY_ANSWER = {"X-Request-ID": "Names this request in the logs and in problem documents."}
+_ON_EVERY_ANSWER = {"X-Request-ID": "Identifies this request in logs and problem documents."}
 _ANSWER_HEADERS = {
-    "201": {"Location": "Address of what was created.", "ETag": "Of its present form."},
-    "202": {"Location": "Where to follow it.", "Retry-After": "Seconds until it is worth asking."},
-    "304": {"ETag": "Of its present form."},
-    "412": {"ETag": "Of its present form."},
-    "503": {"Retry-After": "Seconds until it is worth asking again, where that is known."},
+    "201": {"Location": "URL of the created object.", "ETag": "Its current version."},
+    "202": {"Location": "URL of its status.", "Retry-After": "Seconds to wait before asking."},
+    "304": {"ETag": "Its current version."},
+    "412": {"ETag": "Its current version."},
+    "503": {"Retry-After": "Seconds to wait before asking again, if known."},
 }
 _CONDITIONS = {
-    "304": ("If-None-Match", "ETags that the client has: 304 where one is of the present form."),
-    "412": ("If-Match", "ETag that the thing must have: 412 where it has changed."),
+    "304": ("If-None-Match", "ETags that the client has: 304 if one is the current version."),
+    "412": ("If-Match", "The ETag that the object must still have: 412 if it has changed."),
 }
 _WITH_KEY = (401, 403, 503)
 _LIMITED = (429,)

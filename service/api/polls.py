@@ -16,9 +16,9 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.access.callers import Caller
+from service.api.batched import BatchedQueries
 from service.api.conditional import matches
 from service.api.job_shapes import etag_of_job, etag_of_timeline, headers_of, shown
-from service.api.together import Together
 from service.db.rows import JobResultRow, JobRow
 from service.db.session import Database
 from service.stores import job_store
@@ -122,7 +122,7 @@ class _Polled:
     ):
         self.needs_etag = needs_etag
         self.path_format = "/v1/jobs/{job_id}" + end
-        self.answers = Together(ask)
+        self.answers = BatchedQueries(ask)
 
 
 class _PolledJobs:

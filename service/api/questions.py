@@ -14,7 +14,7 @@ from starlette.datastructures import State
 
 from service.access import key_store
 from service.access.callers import Caller
-from service.api.together import Together
+from service.api.batched import BatchedQueries
 from service.db.rows import JobRow
 from service.db.session import Database
 from service.stores import job_store
@@ -46,11 +46,11 @@ class Questions:
 
     def __init__(self, state: State):
         self._state = state
-        self.callers = Together(self._callers, longest_pause_s=0.0)
-        self.ended_keys = Together(self._ended_keys)
-        self.owners = Together(self._owners, longest_pause_s=0.0)
-        self.jobs = Together(self._jobs)
-        self.versions = Together(self._versions)
+        self.callers = BatchedQueries(self._callers, longest_pause_s=0.0)
+        self.ended_keys = BatchedQueries(self._ended_keys)
+        self.owners = BatchedQueries(self._owners, longest_pause_s=0.0)
+        self.jobs = BatchedQueries(self._jobs)
+        self.versions = BatchedQueries(self._versions)
 
     @property
     def _database(self) -> Database:

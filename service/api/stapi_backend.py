@@ -31,11 +31,11 @@ from service.wire.sites import TargetIn
 from service.wire.spacecraft_types import BUILT_IN
 
 _WHY = {
-    "received": "Waits to be planned.",
-    "scheduled": "A published plan has an image of it.",
+    "received": "Waiting to be planned.",
+    "scheduled": "A published plan includes an image of it.",
     "processing": "The image was taken, and is on board.",
     "completed": "The image is on the ground.",
-    "expired": "The span of the order is over.",
+    "expired": "The time interval of the order has passed.",
     "cancelled": "The catalogue of the order was deleted.",
 }
 

@@ -13,7 +13,7 @@ from fastapi.responses import StreamingResponse
 import planner_core
 from service.answers import store as answer_store
 from service.answers.answered import Answered, in_chunks
-from service.answers.blocks import TIMELINE, Entry, holds, items_in
+from service.answers.chunks import TIMELINE, Entry, holds, items_in
 from service.api import job_intake as intake
 from service.api.accept import preferred, require_offered
 from service.api.conditional import matches, readable, sent

@@ -206,7 +206,7 @@ class JobRow(Made):
 
 
 class JobResultRow(Row):
-    """Marks that a job has an answer; written with all its blocks as the job ends.
+    """Marks that a job has an answer; written with all its chunks as the job ends.
 
     ``figures`` repeats the timeline's numbers for tables.
     """
@@ -216,11 +216,13 @@ class JobResultRow(Row):
     created_at: Mapped[datetime]
 
 
-class JobBlockRow(Row):
-    """A piece of a job's answer (``service.answers.blocks``), which never changes.
+class JobChunkRow(Row):
+    """A piece of a job's answer (``service.answers.chunks``), which never changes.
 
     ``size`` counts the characters of ``text``.
     """
+
+    __tablename__ = "job_block"
 
     job_id: Mapped[str] = mapped_column(sa.ForeignKey("job_result.job_id"), primary_key=True)
     position: Mapped[int] = mapped_column(primary_key=True)

@@ -1,6 +1,6 @@
 """The solver's process: what happens between fork and exit.
 
-It talks to its worker over one pipe: ``CANCEL`` comes in; progress, the blocks of an answer and
+It talks to its worker over one pipe: ``CANCEL`` comes in; progress, the chunks of an answer and
 finally one ending go out. If the worker's end closes, the process exits at once.
 """
 
@@ -91,11 +91,11 @@ def main(
     if isinstance(ending, Answered):
         # In pieces, so that neither side also holds the whole answer as one message.
         answer = ending.answer
-        for block in answer.blocks:
-            outbox.send(block)
+        for chunk in answer.chunks:
+            outbox.send(chunk)
         if answer.opportunity_block is not None:
             outbox.send_opportunities(answer.opportunity_block)
-        ending = Answered(replace(answer, blocks=(), opportunity_block=None))
+        ending = Answered(replace(answer, chunks=(), opportunity_block=None))
     outbox.send(ending)
 
 

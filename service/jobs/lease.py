@@ -15,7 +15,7 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session
 
 from service.answers import store as answer_store
-from service.answers.blocks import Block
+from service.answers.chunks import Chunk
 from service.db.clock import utc_now
 from service.db.rows import JobRow
 from service.db.session import changed
@@ -39,7 +39,7 @@ class Lease:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended. ``blocks`` hold the documents of its answer, if it has one.
+    """How a run ended. ``chunks`` hold the documents of its answer, if it has one.
 
     ``progress`` is the last report; None keeps the job's. ``figures`` are the timeline's numbers
     for tables, ``warnings`` its messages for people. ``num_shared_bytes`` counts the data stored
@@ -50,7 +50,7 @@ class Outcome:
     termination: str | None = None
     error: Mapping[str, str] | None = None
     progress: Mapping[str, Any] | None = None
-    blocks: Sequence[Block] = ()
+    chunks: Sequence[Chunk] = ()
     figures: Mapping[str, Any] | None = None
     num_shared_bytes: int = 0
     warnings: Sequence[str] = ()
@@ -125,12 +125,12 @@ def finish(session: Session, lease: Lease, outcome: Outcome) -> bool:
         validity=None if outcome.figures is None else outcome.figures["validity"],
         warnings=list(outcome.warnings) or None,
     )
-    if is_ended and outcome.blocks:
-        answer_store.save(session, lease.job_id, outcome.blocks, outcome.figures)
+    if is_ended and outcome.chunks:
+        answer_store.save(session, lease.job_id, outcome.chunks, outcome.figures)
         _adopt_replan(session, lease.job_id)
         owner = session.scalars(sa.select(JobRow.tenant).where(JobRow.id == lease.job_id)).one()
-        num_bytes = outcome.num_shared_bytes + sum(len(block.text) for block in outcome.blocks)
-        usage_store.add(session, owner, num_rows=1 + len(outcome.blocks), num_bytes=num_bytes)
+        num_bytes = outcome.num_shared_bytes + sum(len(chunk.text) for chunk in outcome.chunks)
+        usage_store.add(session, owner, num_rows=1 + len(outcome.chunks), num_bytes=num_bytes)
     return is_ended
 
 

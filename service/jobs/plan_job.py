@@ -15,7 +15,7 @@ from planner_core.replanning.plan_before import PlanBefore
 from planner_core.run import plan_scenario
 from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import solver_class
-from service.answers.blocks import target_blocks, timeline_blocks
+from service.answers.chunks import target_chunks, timeline_chunks
 from service.answers.rendering import Documents, figures_of
 from service.jobs.held import HeldBlocks
 from service.jobs.plan_request import PlanAnswer, PlanRequest
@@ -57,9 +57,9 @@ def run_plan_job(request: PlanRequest, budget: Budget) -> PlanAnswer:
     sha256 = request.scenario_sha256
     head = documents.head(job_id=request.job_id, scenario_sha256=sha256, solver=solver)
     return PlanAnswer(
-        blocks=(
-            *timeline_blocks(dumped(head), _satellites(documents)),
-            *target_blocks(map(dumped, documents.targets())),
+        chunks=(
+            *timeline_chunks(dumped(head), _satellites(documents)),
+            *target_chunks(map(dumped, documents.targets())),
         ),
         termination=head.termination,
         reward=judged.timeline.reward,

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.answers.blocks import Block, targets_text, timeline_text
+from service.answers.chunks import Chunk, targets_text, timeline_text
 
 
 class Parcel:
@@ -87,7 +87,7 @@ class PlanAnswer:
 
     Attributes
     ----------
-    blocks
+    chunks
         The timeline document, and each target with its outcome.
     termination
         Why the search ended.
@@ -103,7 +103,7 @@ class PlanAnswer:
         The timeline's messages for people.
     """
 
-    blocks: tuple[Block, ...]
+    chunks: tuple[Chunk, ...]
     termination: str
     reward: float
     bound: float | None = None
@@ -115,9 +115,9 @@ class PlanAnswer:
     @property
     def timeline(self) -> str:
         """Return the timeline document (JSON text)."""
-        return timeline_text(self.blocks)
+        return timeline_text(self.chunks)
 
     @property
     def targets(self) -> str:
         """Return all targets with their outcomes (JSON text of a list)."""
-        return targets_text(self.blocks)
+        return targets_text(self.chunks)

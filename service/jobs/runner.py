@@ -18,7 +18,7 @@ from typing import Any, Final
 import psutil
 
 from planner_core.budget import Progress
-from service.answers.blocks import Block
+from service.answers.chunks import Chunk
 from service.jobs import child
 from service.jobs.child import (
     CANCEL,
@@ -165,7 +165,7 @@ class _Run:
     on_phase: Callable[[str], None]
     _phase: str | None = None
     _progress: Progress | None = None
-    _blocks: list[Block] = field(default_factory=list)
+    _blocks: list[Chunk] = field(default_factory=list)
     _opportunity_block: bytes | None = None
     _has_grace: bool = False
     _grace: Grace | None = None
@@ -197,12 +197,12 @@ class _Run:
 
     def _hear(self, message: object) -> Ending | None:
         if isinstance(message, Answered):
-            blocks, opportunities = tuple(self._blocks), self._opportunity_block
-            return Answered(replace(message.answer, blocks=blocks, opportunity_block=opportunities))
+            chunks, opportunities = tuple(self._blocks), self._opportunity_block
+            return Answered(replace(message.answer, chunks=chunks, opportunity_block=opportunities))
         if isinstance(message, Refused | Stopped):
             is_late = isinstance(message, Stopped) and not self._cancelled
             return self._out_of_time() if is_late else message
-        if isinstance(message, Block):
+        if isinstance(message, Chunk):
             self._blocks.append(message)
         elif isinstance(message, OpportunitiesFollow):
             self._opportunity_block = self.pipe.recv_bytes()

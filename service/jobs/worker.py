@@ -18,7 +18,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from planner_core.budget import Progress
-from service.answers.blocks import proof_blocks
+from service.answers.chunks import proof_chunks
 from service.db.clock import utc_now
 from service.db.failures import why_unavailable
 from service.db.rows import JobRow, PlanActionRow, PlanRow, ScenarioRow, WorkerRow
@@ -202,9 +202,9 @@ class Worker:
 
     def _share(self, sha256: str, answer: PlanAnswer) -> None:
         """Store what other jobs of the scenario need not compute again."""
-        block, bound, proof = answer.opportunity_block, answer.bound, answer.proof
-        if block is not None:
-            self._persist(lambda session: opportunity_store.save(session, sha256, block))
+        chunk, bound, proof = answer.opportunity_block, answer.bound, answer.proof
+        if chunk is not None:
+            self._persist(lambda session: opportunity_store.save(session, sha256, chunk))
         # A cancelled job has not waited for a good bound; the next job shall look for one.
         if bound is not None and proof is not None and answer.termination != "cancelled":
             self._persist(lambda session: bound_store.save(session, sha256, bound, proof))
@@ -268,7 +268,7 @@ def outcome_of(ending: Ending) -> Outcome:
         progress=dataclasses.asdict(
             Progress(phase="verify", fraction=1.0, reward=answer.reward, bound=answer.bound)
         ),
-        blocks=(*answer.blocks, *proof_blocks(answer.proof or "")),
+        chunks=(*answer.chunks, *proof_chunks(answer.proof or "")),
         figures=answer.figures,
         warnings=answer.warnings,
         num_shared_bytes=len(answer.opportunity_block or b""),

@@ -19,7 +19,7 @@ from service.db.rows import (
     ComparisonRow,
     ComparisonRunRow,
     ExecutionRow,
-    JobBlockRow,
+    JobChunkRow,
     JobResultRow,
     JobRow,
     OpportunitySetRow,
@@ -157,20 +157,20 @@ def _sweep_scenarios(session: Session, before: datetime) -> int:
 def _delete_jobs(session: Session, ids: Sequence[str]) -> None:
     if not ids:
         return
-    num_blocks = sa.func.count(JobBlockRow.job_id)
-    num_bytes = sa.func.coalesce(sa.func.sum(sa.func.length(JobBlockRow.text)), 0)
+    num_blocks = sa.func.count(JobChunkRow.job_id)
+    num_bytes = sa.func.coalesce(sa.func.sum(sa.func.length(JobChunkRow.text)), 0)
     taken = (
         sa.select(
             JobRow.tenant, num_blocks, num_bytes, sa.func.count(JobResultRow.job_id.distinct())
         )
         .join(JobResultRow, JobResultRow.job_id == JobRow.id)
-        .outerjoin(JobBlockRow, JobBlockRow.job_id == JobResultRow.job_id)
+        .outerjoin(JobChunkRow, JobChunkRow.job_id == JobResultRow.job_id)
         .where(JobRow.id.in_(ids))
         .group_by(JobRow.tenant)
     )
-    for owner, blocks, size, answers in session.execute(taken).all():
-        usage_store.give_back(session, owner, num_rows=answers + blocks, num_bytes=size)
-    _delete(session, JobBlockRow, JobBlockRow.job_id.in_(ids))
+    for owner, chunks, size, answers in session.execute(taken).all():
+        usage_store.give_back(session, owner, num_rows=answers + chunks, num_bytes=size)
+    _delete(session, JobChunkRow, JobChunkRow.job_id.in_(ids))
     _delete(session, JobResultRow, JobResultRow.job_id.in_(ids))
     _delete(session, JobRow, JobRow.id.in_(ids))
 

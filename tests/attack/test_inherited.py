@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.answers.blocks import timeline_text
+from service.answers.chunks import timeline_text
 from tests.missions import Document, drawn_targets, paper_mission
 from tests.service.test_plan_job import run
 
@@ -16,7 +16,7 @@ def planned(solver: str = "rule", **resources: Any) -> Document:
     """Return the timeline of a mission that begins like this."""
     file = paper_mission(drawn_targets(20))
     file["satellites"][0]["resources"] = {"preset": "paper"} | resources
-    timeline: Document = json.loads(timeline_text(run(file, solver).blocks))
+    timeline: Document = json.loads(timeline_text(run(file, solver).chunks))
     return timeline
 
 

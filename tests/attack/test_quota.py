@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx
 
-from service.answers.blocks import Block
+from service.answers.chunks import Chunk
 from service.jobs import lease
 from service.jobs.lease import Outcome
 from service.stores import usage_store
@@ -60,8 +60,8 @@ def test_what_jobs_find_is_counted_and_who_is_full_sends_no_more(make_door: Make
     with make_door(require_keys=True, max_stored_mb_per_tenant=0.5) as door:
         greedy, other = door.key("submit", "greedy"), door.key("submit", "other")
         job_id = door.submit(greedy)
-        block = Block(kind="head", text="x" * 400_000, first=0, num_items=0)
-        found = Outcome(state="succeeded", blocks=(block,), num_shared_bytes=200_000)
+        chunk = Chunk(kind="head", text="x" * 400_000, first=0, num_items=0)
+        found = Outcome(state="succeeded", chunks=(chunk,), num_shared_bytes=200_000)
         with door.jobs.database.transaction() as session:
             held = lease.start(session, job_id, 1, lease_s=60.0)
             assert held is not None

@@ -14,21 +14,21 @@ from alembic import command
 from alembic.config import Config
 
 from service.answers import store as answer_store
-from service.answers.blocks import (
+from service.answers.chunks import (
     TIMELINE,
-    Block,
+    Chunk,
     contents_of,
-    proof_blocks,
-    target_blocks,
+    proof_chunks,
+    target_chunks,
 )
 from service.answers.rendering import figures_of
 from service.db.migrate import config_on
 from service.db.rows import JobResultRow
 from service.db.session import Database
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.jobs.conftest import SERVER_URL, create_database
 from tests.service.jobs.work import EMPTY
-from tests.service.test_blocks import target, timeline_of
+from tests.service.test_chunks import target, timeline_of
 
 Change = Callable[[Config, str], None]
 
@@ -58,7 +58,7 @@ ANSWERS = {
 
 @pytest.fixture
 def database(tmp_path: Path) -> Iterator[Database]:
-    """A database of the version before blocks, with some answers."""
+    """A database of the version before chunks, with some answers."""
     url = f"sqlite:///{tmp_path / 'old.db'}"
     if SERVER_URL is not None:
         url = create_database(SERVER_URL, "template1")
@@ -88,10 +88,10 @@ def move(database: Database, change: Change, revision: str) -> None:
 def test_older_answers_are_cut_into_the_blocks_of_newer_ones(database: Database) -> None:
     move(database, command.upgrade, "head")
     for job_id, texts in ANSWERS.items():
-        expected: list[Block] = [
-            *blocks_of_timeline(json.loads(texts["timeline"])),
-            *target_blocks(json.loads(texts["targets"])),
-            *proof_blocks(texts["proof"] or ""),
+        expected: list[Chunk] = [
+            *chunks_of_timeline(json.loads(texts["timeline"])),
+            *target_chunks(json.loads(texts["targets"])),
+            *proof_chunks(texts["proof"] or ""),
         ]
         with database.reading() as session:
             contents = answer_store.contents(session, job_id, *TIMELINE, "targets", "proof")
@@ -99,7 +99,7 @@ def test_older_answers_are_cut_into_the_blocks_of_newer_ones(database: Database)
             assert answer_store.proof_of(session, job_id) == texts["proof"]
         assert contents == contents_of(expected)
         found = answer_store.texts(database.reading, job_id, contents)
-        assert [text for _, text in found] == [block.text for block in expected]
+        assert [text for _, text in found] == [chunk.text for chunk in expected]
 
 
 def test_going_back_restores_every_text(database: Database) -> None:

@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from service.access import key_store
 from service.access.callers import Scope
 from service.answers import store as answer_store
-from service.answers.blocks import Block
+from service.answers.chunks import Chunk
 from service.db.rows import JobRow
 from tests.plain_http import NO_TLS
 from tests.service.conftest import new_app, serve
@@ -89,11 +89,11 @@ class Desk:
     door: Door
     mission: Mission
 
-    def answered_job(self, key: dict[str, str], blocks: tuple[Block, ...] | None = None) -> str:
+    def answered_job(self, key: dict[str, str], chunks: tuple[Chunk, ...] | None = None) -> str:
         """Return a job that has the mission's answer."""
         job_id = self.door.submit(key)
         with self.door.jobs.database.transaction() as session:
-            answer_store.save(session, job_id, blocks or self.mission.blocks, None)
+            answer_store.save(session, job_id, chunks or self.mission.chunks, None)
             session.execute(sa.update(JobRow).where(JobRow.id == job_id).values(state="succeeded"))
         return job_id
 

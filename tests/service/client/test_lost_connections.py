@@ -20,7 +20,7 @@ from service.client import (
 )
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.client.trouble import Answer, Cut, LostAnswer, Proxy
 from tests.service.jobs.conftest import Jobs, Workers
 
@@ -44,9 +44,9 @@ def begin(jobs: Jobs, job_id: str) -> Lease:
 
 
 def end(jobs: Jobs, held: Lease, filler: str = "") -> None:
-    blocks = tuple(blocks_of_timeline({"filler": filler, "satellites": []}))
+    chunks = tuple(chunks_of_timeline({"filler": filler, "satellites": []}))
     with jobs.database.transaction() as session:
-        assert lease.finish(session, held, Outcome(state="succeeded", blocks=blocks))
+        assert lease.finish(session, held, Outcome(state="succeeded", chunks=chunks))
 
 
 def finish(jobs: Jobs, job_id: str, filler: str = "") -> None:

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from planner_core.domain import Scenario
 from service.answers import store as answer_store
 from service.answers.answered import Answered
-from service.answers.blocks import Block, targets_text, timeline_text
+from service.answers.chunks import Chunk, targets_text, timeline_text
 from service.db.ids import new_id
 from service.db.rows import JobResultRow, JobRow, ScenarioRow
 from service.scenarios.canonical import canonical, sha256_of
@@ -42,15 +42,15 @@ class Mission:
     """A scenario file in its canonical form, and the stored texts of its plan."""
 
     content: str
-    blocks: tuple[Block, ...]
+    chunks: tuple[Chunk, ...]
 
     @property
     def timeline(self) -> str:
-        return timeline_text(self.blocks)
+        return timeline_text(self.chunks)
 
     @property
     def targets(self) -> str:
-        return targets_text(self.blocks)
+        return targets_text(self.chunks)
 
     @property
     def told(self) -> list[Document]:
@@ -105,7 +105,7 @@ def mission_file(**flags: object) -> Document:
 def mission() -> Mission:
     file = mission_file()
     answer = run(file, "rule")
-    return Mission(content=canonical(file), blocks=answer.blocks)
+    return Mission(content=canonical(file), chunks=answer.chunks)
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def store_job(service: Service, mission: Mission) -> str:
                 finished_at=FINISHED_AT,
             )
         )
-        answer_store.save(session, job_id, mission.blocks, None)
+        answer_store.save(session, job_id, mission.chunks, None)
         session.execute(sa.update(JobResultRow).values(created_at=FINISHED_AT))
     return f"/v1/jobs/{job_id}"
 

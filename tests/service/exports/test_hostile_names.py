@@ -38,7 +38,7 @@ def hostile() -> tuple[Mission, Answered]:
         targets[number]["id"] = name
     for number, part in enumerate([*file["satellites"], *stations]):
         part |= {"name": HOSTILE[number], "id": HOSTILE[-1 - number]}
-    mission = Mission(content=canonical(file), blocks=run(file, "rule").blocks)
+    mission = Mission(content=canonical(file), chunks=run(file, "rule").chunks)
     return mission, answered_of(mission.timeline, mission.targets, mission.content, FINISHED_AT)
 
 

@@ -36,7 +36,7 @@ def followed() -> Mission:
         ],
     }  # fmt: skip
     file |= {"states": [state], "objective": "delivered"}
-    return Mission(content=canonical(file), blocks=run(file, "rule").blocks)
+    return Mission(content=canonical(file), chunks=run(file, "rule").chunks)
 
 
 @pytest.fixture(scope="module")

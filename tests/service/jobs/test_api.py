@@ -13,13 +13,13 @@ import pytest
 import sqlalchemy as sa
 
 from planner_core.solvers.registry import SOLVERS
-from service.answers.blocks import proof_blocks, target_blocks
+from service.answers.chunks import proof_chunks, target_chunks
 from service.db.rows import JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.jobs.queue import DbosQueue
 from service.jobs.solver_params import params_of
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.conftest import checked_client, new_app, serve
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import EMPTY
@@ -69,7 +69,7 @@ def finish(jobs: Jobs, job_id: str, outcome: Outcome | None = None) -> None:
     answered = Outcome(
         state="succeeded",
         termination="optimal",
-        blocks=(*blocks_of_timeline(TIMELINE), *target_blocks(TARGETS)),
+        chunks=(*chunks_of_timeline(TIMELINE), *target_chunks(TARGETS)),
     )
     held = start(jobs, job_id)
     with jobs.database.transaction() as session:
@@ -327,8 +327,8 @@ def test_the_proof_of_a_bound_is_kept_with_the_answer(client: httpx.Client, jobs
     found = {"version": 1, "proof": "lagrangian", "value": 3.0, "prices": [1.0, 2.0]}
     for proof, shown in ((json.dumps(found), found), (None, None)):
         job_id = posted(client, jobs)
-        blocks = (*blocks_of_timeline(TIMELINE), *proof_blocks(proof or ""))
-        answered = Outcome(state="succeeded", blocks=blocks)
+        chunks = (*chunks_of_timeline(TIMELINE), *proof_chunks(proof or ""))
+        answered = Outcome(state="succeeded", chunks=chunks)
         finish(jobs, job_id, answered)
         path = f"/v1/jobs/{job_id}/proof"
         answer = client.get(path)
@@ -424,7 +424,7 @@ def test_a_plan_that_breaks_limits_says_so_on_its_job_and_in_the_list(
     outcome = Outcome(
         state="succeeded",
         termination="optimal",
-        blocks=tuple(blocks_of_timeline(TIMELINE)),
+        chunks=tuple(chunks_of_timeline(TIMELINE)),
         figures={"validity": "violations"},
         warnings=("Elements are old.",),
     )

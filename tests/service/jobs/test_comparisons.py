@@ -9,7 +9,7 @@ import pytest
 
 from service.answers.rendering import figures_of
 from service.jobs.lease import Outcome
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.conftest import new_app, serve
 from tests.service.jobs.conftest import Jobs
 from tests.service.jobs.test_api import finish, start
@@ -79,7 +79,7 @@ def test_the_table_fills_line_by_line(client: httpx.Client, jobs: Jobs) -> None:
         Outcome(
             state="succeeded",
             termination="horizon_complete",
-            blocks=tuple(blocks_of_timeline(EMPTY)),
+            chunks=tuple(chunks_of_timeline(EMPTY)),
             figures=FIGURES,
         ),
     )

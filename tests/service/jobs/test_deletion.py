@@ -48,7 +48,7 @@ def test_a_finished_job_is_deleted_with_its_answer(client: httpx.Client, jobs: J
     assert used(jobs) == before
     assert_problem(client.get(f"/v1/jobs/{job_id}"), 404, "not_found")
     assert_problem(client.delete(f"/v1/jobs/{job_id}"), 404, "not_found")
-    for row in (rows.JobRow, rows.JobResultRow, rows.JobBlockRow):
+    for row in (rows.JobRow, rows.JobResultRow, rows.JobChunkRow):
         assert count(jobs, row) == 0
     last = client.get("/v1/audit-events").json()["items"][0]
     assert (last["action"], last["object_id"]) == ("delete", job_id)

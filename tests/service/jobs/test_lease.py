@@ -15,13 +15,13 @@ from service.db.rows import JobResultRow, JobRow
 from service.jobs import lease
 from service.jobs.lease import Lease, Outcome
 from service.stores import usage_store
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.jobs.conftest import Jobs
 
 ANSWERED = Outcome(
     state="succeeded",
     termination="optimal",
-    blocks=tuple(blocks_of_timeline({"validity": "valid", "satellites": []})),
+    chunks=tuple(chunks_of_timeline({"validity": "valid", "satellites": []})),
 )
 
 
@@ -150,10 +150,10 @@ def test_answers_are_counted_with_their_owner_and_their_warnings_are_told(jobs: 
     finish(jobs, started(jobs, jobs.submit("answer")))
     outcome = replace(ANSWERED, num_shared_bytes=1000, warnings=("Elements are old.",))
     finish(jobs, started(jobs, job_id), outcome)
-    num_chars = sum(len(block.text) for block in ANSWERED.blocks)
+    num_chars = sum(len(chunk.text) for chunk in ANSWERED.chunks)
     with jobs.database.reading() as session:
         used = usage_store.used(session, "local")
-    assert used == (2 * (1 + len(ANSWERED.blocks)), 1000 + 2 * num_chars)
+    assert used == (2 * (1 + len(ANSWERED.chunks)), 1000 + 2 * num_chars)
     assert jobs.job(job_id).warnings == ["Elements are old."]
 
 

@@ -11,11 +11,11 @@ import psutil
 
 from planner_core.budget import Budget, Progress
 from planner_core.errors import Cancelled, InvalidScenario
-from service.answers.blocks import target_blocks
+from service.answers.chunks import target_chunks
 from service.jobs.plan_request import PlanAnswer, PlanRequest
 from service.jobs.runner import Work
 from tests.patience import PATIENCE_S
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 
 _FOREVER_S = 3 * PATIENCE_S
 _SPAN = {"start": "2026-03-01T00:00:00.000Z", "end": "2026-03-02T00:00:00.000Z"}
@@ -131,7 +131,7 @@ def answer(request: PlanRequest, termination: str) -> PlanAnswer:
     timeline = EMPTY | {"job": request.job_id, "run": request.run, "termination": termination}
     targets = [{"target_id": "t0", "outcome": "collected", "reason": None}]
     return PlanAnswer(
-        blocks=(*blocks_of_timeline(timeline), *target_blocks(targets)),
+        chunks=(*chunks_of_timeline(timeline), *target_chunks(targets)),
         termination=termination,
         reward=1.0,
         opportunity_block=None if request.opportunity_block.take() else b"block",

@@ -17,7 +17,7 @@ from service.jobs.lease import Outcome
 from service.jobs.reconcile import Reconciler
 from service.webhooks import outbox
 from tests.patience import PATIENCE_S
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.jobs.conftest import Jobs, Workers
 from tests.service.jobs.work import EMPTY
 from tests.service.webhooks.conftest import Post, StartCourier
@@ -287,7 +287,7 @@ def test_an_end_tells_whether_the_plan_breaks_limits(post: Post, courier: StartC
     post.webhook()
     outcome = Outcome(
         state="succeeded",
-        blocks=tuple(blocks_of_timeline(EMPTY)),
+        chunks=tuple(chunks_of_timeline(EMPTY)),
         figures={"validity": "violations"},
         warnings=("Elements are old.",),
     )

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
-from service.answers.blocks import head_in
-from service.db.rows import JobBlockRow, JobRow
+from service.answers.chunks import head_in
+from service.db.rows import JobChunkRow, JobRow
 from service.wire.jobs import FINAL
 from tests.service.jobs.conftest import Jobs
 
@@ -62,7 +62,7 @@ def read_ledger(jobs: Jobs) -> list[Ended]:
             sa.select(_ENDINGS.c.job_id, sa.func.count()).group_by(_ENDINGS.c.job_id)
         )
         endings = {job_id: number for job_id, number in counted}  # noqa: C416 - rows are no pairs
-        heads = sa.select(JobBlockRow.job_id, JobBlockRow.text).where(JobBlockRow.kind == "head")
+        heads = sa.select(JobChunkRow.job_id, JobChunkRow.text).where(JobChunkRow.kind == "head")
         runs = {row.job_id: head_in(row.text)["run"] for row in session.execute(heads)}
         rows = session.scalars(sa.select(JobRow).order_by(JobRow.finished_at))
         return [Ended(job, endings.get(job.id, 0), runs.get(job.id)) for job in rows]

@@ -1,7 +1,7 @@
-"""The documents of an answer in blocks: neither readers nor writers need to hold a whole one.
+"""The documents of an answer in chunks: neither readers nor writers need to hold a whole one.
 
-The texts of a document's blocks, concatenated, are the document (JSON). Each block also describes
-its content, so that a reader can take only the blocks that it needs.
+The texts of a document's chunks, concatenated, are the document (JSON). Each chunk also describes
+its content, so that a reader can take only the chunks that it needs.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ T = TypeVar("T")
 
 Kind = Literal["head", "satellite", "actions", "rest", "tail", "targets", "proof"]
 TIMELINE: Final[tuple[Kind, ...]] = ("head", "satellite", "actions", "rest", "tail")
-"""The kinds of blocks in a timeline."""
+"""The kinds of chunks in a timeline."""
 
 NUM_ITEMS: Final = 200
-"""Actions or targets per block: about 80 kB."""
+"""Actions or targets per chunk: about 80 kB."""
 NUM_CHARS: Final = 1 << 16
-"""Characters per block that holds no items."""
+"""Characters per chunk that holds no items."""
 
 _HEAD_ENDS: Final = ', "satellites": ['
 _SATELLITE_ENDS: Final = ', "actions": ['
@@ -31,7 +31,7 @@ _BETWEEN: Final = ", "
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
+class Chunk:
     """A piece of a document.
 
     Attributes
@@ -58,7 +58,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """A block in a table of contents: without its text, whose length is ``size``."""
+    """A chunk in a table of contents: without its text, whose length is ``size``."""
 
     position: int
     kind: Kind
@@ -69,21 +69,21 @@ class Entry:
 
 
 _TOLD: Final = ("kind", "first", "num_items", "tally")
-"""Fields that a block and its entry share."""
+"""Fields that a chunk and its entry share."""
 
 
-def contents_of(blocks: Iterable[Block]) -> list[Entry]:
-    """Return the table of contents of blocks in this order."""
+def contents_of(chunks: Iterable[Chunk]) -> list[Entry]:
+    """Return the table of contents of chunks in this order."""
     return [
-        Entry(position=position, size=len(block.text), **{n: getattr(block, n) for n in _TOLD})
-        for position, block in enumerate(blocks)
+        Entry(position=position, size=len(chunk.text), **{n: getattr(chunk, n) for n in _TOLD})
+        for position, chunk in enumerate(chunks)
     ]
 
 
-def timeline_blocks(
+def timeline_chunks(
     head: Document, satellites: Iterable[tuple[Document, Iterable[Document], Document]]
-) -> Iterator[Block]:
-    """Yield the blocks of a timeline.
+) -> Iterator[Chunk]:
+    """Yield the chunks of a timeline.
 
     Parameters
     ----------
@@ -92,27 +92,27 @@ def timeline_blocks(
     satellites
         For each, the fields before its actions, its actions, and the fields after them.
     """
-    yield Block(kind="head", text=json.dumps(head)[:-1] + _HEAD_ENDS)
+    yield Chunk(kind="head", text=json.dumps(head)[:-1] + _HEAD_ENDS)
     num_actions = 0
     for number, (about, actions, rest) in enumerate(satellites):
         comma = _BETWEEN if number else ""
         text = comma + json.dumps(about)[:-1] + _SATELLITE_ENDS
-        yield Block(kind="satellite", text=text, first=number)
+        yield Chunk(kind="satellite", text=text, first=number)
         own_first = num_actions
         for some in _groups(actions):
             text = _items_text(some, is_first=num_actions == own_first)
-            yield Block(kind="actions", text=text, first=num_actions, num_items=len(some))
+            yield Chunk(kind="actions", text=text, first=num_actions, num_items=len(some))
             num_actions += len(some)
         text = f"], {json.dumps(rest)[1:]}" if rest else "]}"
-        yield from (Block(kind="rest", text=part, first=number) for part in _parts(text))
-    yield Block(kind="tail", text="]}")
+        yield from (Chunk(kind="rest", text=part, first=number) for part in _parts(text))
+    yield Chunk(kind="tail", text="]}")
 
 
-def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
-    """Yield the blocks of a list of targets with outcomes; `targets_text` adds the brackets."""
+def target_chunks(targets: Iterable[Document]) -> Iterator[Chunk]:
+    """Yield the chunks of a list of targets with outcomes; `targets_text` adds the brackets."""
     first = 0
     for some in _groups(targets):
-        yield Block(
+        yield Chunk(
             kind="targets",
             text=_items_text(some, is_first=first == 0),
             first=first,
@@ -124,13 +124,13 @@ def target_blocks(targets: Iterable[Document]) -> Iterator[Block]:
         first += len(some)
 
 
-def proof_blocks(proof: str) -> Iterator[Block]:
-    """Yield the blocks of a proof document, given as text."""
-    return (Block(kind="proof", text=part) for part in _parts(proof))
+def proof_chunks(proof: str) -> Iterator[Chunk]:
+    """Yield the chunks of a proof document, given as text."""
+    return (Chunk(kind="proof", text=part) for part in _parts(proof))
 
 
 def holds(tally: Mapping[str, int], outcome: str | None, reason: str | None) -> bool:
-    """Return whether a block of targets has one with this outcome and reason; None matches any.
+    """Return whether a chunk of targets has one with this outcome and reason; None matches any.
 
     >>> holds({"unscheduled/battery": 2}, "unscheduled", None), holds({"collected/": 1}, None, "x")
     (True, False)
@@ -178,14 +178,14 @@ def batches(items: Iterable[T], size_of: Callable[[T], int], most: int) -> Itera
         yield batch
 
 
-def timeline_text(blocks: Iterable[Block]) -> str:
-    """Return the whole timeline among blocks."""
-    return "".join(block.text for block in blocks if block.kind in TIMELINE)
+def timeline_text(chunks: Iterable[Chunk]) -> str:
+    """Return the whole timeline among chunks."""
+    return "".join(chunk.text for chunk in chunks if chunk.kind in TIMELINE)
 
 
-def targets_text(blocks: Iterable[Block]) -> str:
-    """Return the whole list of targets among blocks."""
-    return f"[{''.join(block.text for block in blocks if block.kind == 'targets')}]"
+def targets_text(chunks: Iterable[Chunk]) -> str:
+    """Return the whole list of targets among chunks."""
+    return f"[{''.join(chunk.text for chunk in chunks if chunk.kind == 'targets')}]"
 
 
 def _items_text(items: Iterable[Document], *, is_first: bool) -> str:

@@ -15,7 +15,7 @@ _PAUSE_EACH_S: Final = 0.02
 _MOST_KEYS: Final = 500
 
 
-class Together(Generic[K, T]):
+class BatchedQueries(Generic[K, T]):
     """Gathers the keys that are asked for while a query runs, and queries them all in the next.
 
     No answer is older than its question: the query that answers it begins after it was asked.
@@ -41,7 +41,7 @@ class Together(Generic[K, T]):
         self._ask = ask
         self._longest_pause_s = longest_pause_s
         # The loop's ``run_in_executor`` costs less than Starlette's, which can be cancelled.
-        self._thread = ThreadPoolExecutor(1, "together")
+        self._thread = ThreadPoolExecutor(1, "batched-queries")
         self._is_asking = asyncio.Lock()
         self._gathering: tuple[list[K], asyncio.Task[Mapping[K, T]]] | None = None
         self._not_before_s = 0.0

@@ -1,4 +1,4 @@
-"""Documents in blocks: the same documents, in pieces of bounded size."""
+"""Documents in chunks: the same documents, in pieces of bounded size."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Any
 
 import pytest
 
-from service.answers.blocks import (
+from service.answers.chunks import (
     NUM_CHARS,
     NUM_ITEMS,
-    Block,
+    Chunk,
     contents_of,
     head_in,
     holds,
     items_in,
-    proof_blocks,
+    proof_chunks,
     satellite_in,
-    target_blocks,
+    target_chunks,
     targets_text,
     timeline_text,
 )
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 
 Document = dict[str, Any]
 
@@ -59,47 +59,47 @@ def target(number: int) -> Document:
 )
 def test_a_timeline_in_blocks_is_the_same_document(num_actions: tuple[int, ...]) -> None:
     timeline = timeline_of(*num_actions)
-    blocks = list(blocks_of_timeline(timeline))
-    assert timeline_text(blocks) == json.dumps(timeline)
-    assert max(block.num_items for block in blocks) <= NUM_ITEMS
-    assert max(len(block.text) for block in blocks if not block.num_items) <= NUM_CHARS
+    chunks = list(chunks_of_timeline(timeline))
+    assert timeline_text(chunks) == json.dumps(timeline)
+    assert max(chunk.num_items for chunk in chunks) <= NUM_ITEMS
+    assert max(len(chunk.text) for chunk in chunks if not chunk.num_items) <= NUM_CHARS
 
 
 def test_each_block_of_a_timeline_can_be_read_alone() -> None:
     timeline = timeline_of(3, 0, 2 * NUM_ITEMS + 1)
-    blocks = list(blocks_of_timeline(timeline))
-    by_kind: dict[str, list[Block]] = {}
-    for block in blocks:
-        by_kind.setdefault(block.kind, []).append(block)
+    chunks = list(chunks_of_timeline(timeline))
+    by_kind: dict[str, list[Chunk]] = {}
+    for chunk in chunks:
+        by_kind.setdefault(chunk.kind, []).append(chunk)
     (head,) = by_kind["head"]
     assert head_in(head.text) == {k: v for k, v in timeline.items() if k != "satellites"}
-    told = [satellite_in(block.text) for block in by_kind["satellite"]]
+    told = [satellite_in(chunk.text) for chunk in by_kind["satellite"]]
     assert told == [{"id": s["id"], "name": s["name"]} for s in timeline["satellites"]]
-    for block in by_kind["actions"]:
-        numbers = range(block.first, block.first + block.num_items)
-        assert items_in(block.text) == [action(number) for number in numbers]
+    for chunk in by_kind["actions"]:
+        numbers = range(chunk.first, chunk.first + chunk.num_items)
+        assert items_in(chunk.text) == [action(number) for number in numbers]
 
 
 def test_targets_in_blocks_are_the_same_list_and_say_what_they_hold() -> None:
     targets = [target(number) for number in range(2 * NUM_ITEMS + 7)]
-    blocks = list(target_blocks(targets))
-    assert targets_text(blocks) == json.dumps(targets)
-    assert [block.num_items for block in blocks] == [NUM_ITEMS, NUM_ITEMS, 7]
-    for block in blocks:
-        own = targets[block.first : block.first + block.num_items]
-        assert items_in(block.text) == own
-        assert block.tally == Counter(
+    chunks = list(target_chunks(targets))
+    assert targets_text(chunks) == json.dumps(targets)
+    assert [chunk.num_items for chunk in chunks] == [NUM_ITEMS, NUM_ITEMS, 7]
+    for chunk in chunks:
+        own = targets[chunk.first : chunk.first + chunk.num_items]
+        assert items_in(chunk.text) == own
+        assert chunk.tally == Counter(
             f"{one['outcome']}/{one['reason']['code'] if one['reason'] else ''}" for one in own
         )
-        assert holds(block.tally, "unscheduled", "battery")
-        assert not holds(block.tally, "collected", "battery")
-        assert not holds(block.tally, "excluded", None)
-    assert targets_text(target_blocks([])) == "[]"
+        assert holds(chunk.tally, "unscheduled", "battery")
+        assert not holds(chunk.tally, "collected", "battery")
+        assert not holds(chunk.tally, "excluded", None)
+    assert targets_text(target_chunks([])) == "[]"
 
 
 def test_a_proof_in_blocks_is_the_same_text() -> None:
     proof = json.dumps({"prices": [0.1] * NUM_CHARS})
-    blocks = list(proof_blocks(proof))
-    assert "".join(block.text for block in blocks) == proof
-    assert len(blocks) > 1
-    assert [entry.position for entry in contents_of(blocks)] == list(range(len(blocks)))
+    chunks = list(proof_chunks(proof))
+    assert "".join(chunk.text for chunk in chunks) == proof
+    assert len(chunks) > 1
+    assert [entry.position for entry in contents_of(chunks)] == list(range(len(chunks)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from service.api.together import Together
+from service.api.batched import BatchedQueries
 
 
 @dataclass(slots=True)
@@ -43,7 +43,7 @@ def test_those_who_ask_while_a_query_runs_share_the_next_one(source: Source) -> 
     source.may_go_on.set()
 
     async def ask() -> list[str | None]:
-        together = Together(source.ask)
+        together = BatchedQueries(source.ask)
         return await asyncio.gather(*map(together.get, ("b", "a", "b", "absent", "a")))
 
     assert asyncio.run(ask()) == ["b0", "a0", "b0", None, "a0"]
@@ -54,7 +54,7 @@ def test_no_answer_is_older_than_its_question(source: Source) -> None:
     """Who asks while a query runs waits for the next one: this one has read already."""
 
     async def ask() -> tuple[str | None, ...]:
-        together = Together(source.ask)
+        together = BatchedQueries(source.ask)
         first = asyncio.create_task(together.get("a"))
         await source.until_read()
         source.value = 1
@@ -72,7 +72,7 @@ def test_an_error_is_told_to_all_who_asked_and_to_nobody_later(source: Source) -
     source.may_go_on.set()
 
     async def ask() -> tuple[list[object], str | None]:
-        together = Together(source.ask)
+        together = BatchedQueries(source.ask)
         source.value = -1
         failed = await asyncio.gather(*map(together.get, "ab"), return_exceptions=True)
         source.value = 2
@@ -83,7 +83,7 @@ def test_an_error_is_told_to_all_who_asked_and_to_nobody_later(source: Source) -
 
 def test_who_goes_away_takes_no_answer_along(source: Source) -> None:
     async def ask() -> str | None:
-        together = Together(source.ask)
+        together = BatchedQueries(source.ask)
         leaving, staying = (asyncio.create_task(together.get(key)) for key in "ab")
         await source.until_read()
         leaving.cancel()
@@ -100,7 +100,7 @@ def test_any_number_of_keys_is_asked_for_in_queries_that_have_room(source: Sourc
     keys = [f"k{number}-" for number in range(1_234)]
 
     async def ask() -> list[str | None]:
-        together = Together(source.ask)
+        together = BatchedQueries(source.ask)
         return await asyncio.gather(*map(together.get, keys))
 
     assert asyncio.run(ask()) == [f"{key}0" for key in keys]
@@ -111,9 +111,9 @@ def test_any_number_of_keys_is_asked_for_in_queries_that_have_room(source: Sourc
 def test_what_nobody_should_wait_for_is_asked_without_a_pause(source: Source) -> None:
     source.may_go_on.set()
 
-    async def not_before_s(together: Together[str, str]) -> float:
+    async def not_before_s(together: BatchedQueries[str, str]) -> float:
         await asyncio.gather(*(together.get(f"k{number}-") for number in range(50)))
         return together._not_before_s - asyncio.get_running_loop().time()
 
-    assert asyncio.run(not_before_s(Together(source.ask, longest_pause_s=0.0))) <= 0.0
-    assert asyncio.run(not_before_s(Together(source.ask, longest_pause_s=9e9))) > 0.0
+    assert asyncio.run(not_before_s(BatchedQueries(source.ask, longest_pause_s=0.0))) <= 0.0
+    assert asyncio.run(not_before_s(BatchedQueries(source.ask, longest_pause_s=9e9))) > 0.0
