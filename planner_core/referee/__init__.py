@@ -1,1 +1,1 @@
-"""The referee: replays a plan, says what it earns and which rules it breaks."""
+"""The referee: replays a plan, reports what it earns and which rules it breaks."""

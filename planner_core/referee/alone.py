@@ -1,7 +1,7 @@
-"""What the referee says of a satellite's own actions, whatever the others do.
+"""The referee's verdict on one satellite's actions, which does not depend on the other satellites.
 
-From one plan of a search to the next few satellites change, and what was said of the others holds:
-of README's fleet four in ten have been judged before.
+Between successive plans of a search only some satellites change, so verdicts are remembered: for
+the README's fleet, four in ten were judged before.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from planner_core.referee.rules import turns
 from planner_core.referee.timeline import Violation
 
 _MOST_KEPT: Final = 500_000
-"""Actions and points of curves that are remembered of a problem: 20 MB."""
+"""How many actions and curve points are remembered per problem: 20 MB."""
 
 
 class Alone(NamedTuple):
-    """The verdict on a satellite's own actions, which are counted from 0.
+    """The verdict on a satellite's own actions, which are numbered from 0.
 
     Attributes
     ----------
     turns, limits
-        What they break between one and the next, and of battery and recorder.
+        Violations between successive actions, and of the limits of battery and recorder.
     profile
-        Battery and recorder under them; None where the problem knows none.
+        Battery and recorder over the horizon; None if the problem ignores resources.
     down_s
-        When the image of each is on the ground; NaN for never, and for contacts.
+        When the image of each action is on the ground; NaN for never, and for contacts.
     """
 
     turns: list[Violation]
@@ -45,20 +45,20 @@ class Alone(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many actions and points of curves it holds."""
+        """The number of actions and curve points in it."""
         num_points = 0 if self.profile is None else len(self.profile.curve.time_s)
         return len(self.down_s) + num_points
 
 
 def judged_alone(problem: Problem, index: int, plan: Plan, positions: Sequence[int]) -> Alone:
-    """Return the verdict on a satellite's actions of a plan, which are given in order."""
+    """Return the verdict on a satellite's actions, given by their positions in time order."""
     if problem not in _known:
         _known[problem] = _Known()
     return _known[problem].verdict(problem, index, plan, positions)
 
 
 class _Known:
-    """The verdicts on satellites of a problem that were asked for last, by any thread."""
+    """The most recently used verdicts on satellites of a problem, shared by all threads."""
 
     def __init__(self) -> None:
         self._verdicts: dict[tuple[int, bytes, bytes, bytes], Alone] = {}
@@ -66,7 +66,7 @@ class _Known:
         self._lock = Lock()
 
     def verdict(self, problem: Problem, index: int, plan: Plan, positions: Sequence[int]) -> Alone:
-        """Return a verdict that is known or worked out now."""
+        """Return the remembered verdict, or work it out."""
         own = plan.columns.at(np.asarray(positions, dtype=np.int64))
         asked = index, own.row.tobytes(), own.start_s.tobytes(), own.end_s.tobytes()
         found = self._verdicts.get(asked)
@@ -85,7 +85,7 @@ _known: WeakKeyDictionary[Problem, _Known] = WeakKeyDictionary()
 
 
 def judge_alone(problem: Problem, index: int, own: Plan) -> Alone:
-    """Return the verdict on a plan of one satellite, worked out anew."""
+    """Return the verdict on a plan of one satellite, without using remembered ones."""
     positions = range(len(own.actions))
     broken = turns(problem, own, index, positions)
     if not problem.use_resources:

@@ -1,4 +1,4 @@
-"""Images that recorders held at the start: when they come down, and what that earns."""
+"""Images that recorders held at the start: when they are downlinked, and what that earns."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class BroughtDown:
     Attributes
     ----------
     image
-        Its place in ``problem.on_board``.
+        Its index in ``problem.on_board``.
     delivered_s, age_s
         When its last bit is on the ground, and how long after its collect; None for never.
     earned
-        What it earns by that.
+        What its delivery earns.
     """
 
     image: int
@@ -43,7 +43,7 @@ def brought_down_of(
     by_satellite: Sequence[Sequence[int]],
     profiles: Sequence[Profile | None],
 ) -> tuple[BroughtDown, ...]:
-    """Return what images earn that were on board: of a target's the one that earns most."""
+    """Return what images on board at the start earn; only the best one of each target earns."""
     down = np.full(len(problem.on_board), np.nan)
     for index, profile in enumerate(profiles):
         own = [i for i, image in enumerate(problem.on_board) if image.satellite == index]
@@ -55,7 +55,7 @@ def brought_down_of(
     found = []
     best: dict[int, int] = {}
     for i, image in enumerate(problem.on_board):
-        # What is on the ground already earns nothing more.
+        # An image that was on the ground before the horizon earns nothing more.
         is_down = image.amount > 0.0 and not math.isnan(down[i])
         age_s = float(down[i]) - image.collected_s if is_down else math.inf
         earned = 0.0

@@ -1,4 +1,4 @@
-"""What a contact takes down while it lasts, as the referee counts it: instant by instant."""
+"""The data rate during a contact over time, as the referee computes it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from planner_core.problem.plan import Action, Columns
 
 
 def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> Floats:
-    """Return the rate during a contact, in order of time; nothing of it while it is set up.
+    """Return the data rate during a contact, without its set-up time, in order of time.
 
     Returns
     -------
-    From when until when (s), and how fast data comes down meanwhile, in recorder capacities per
-    second. Shape ``(k, 3)``.
+    Start and end of each piece (s), and its mean data rate in recorder capacities per second.
+    Shape ``(k, 3)``.
 
     Notes
     -----
-    The rate is linear between the instants at which the pass knows it, so the mean of a piece is
-    that at its middle.
+    The rate is linear between the instants for which the pass gives it, so the mean over a piece
+    is the rate at its middle.
     """
     table, links = problem.opportunities, problem.downlinks
     station = int(table.site[action.opportunity])
@@ -39,7 +39,7 @@ def flow(problem: Problem, satellite: SatelliteProblem, action: Action) -> Float
 
 
 def flows(problem: Problem, satellite: SatelliteProblem, contacts: Columns) -> Floats:
-    """Return the same of many contacts, one after another. Shape ``(k, 3)``."""
+    """Return the same for many contacts, one after another. Shape ``(k, 3)``."""
     table, links = problem.opportunities, problem.downlinks
     station = table.site[contacts.row]
     return _flows(
@@ -63,7 +63,7 @@ def _flows(
     per_s: Floats,
     first: Longs,
 ) -> Floats:
-    """Return the pieces of contacts; ``which`` pass each has, -1 for one at a plain rate."""
+    """Return the pieces of contacts; ``which`` is the pass of each, -1 for a constant rate."""
     most = len(which)
     for i in range(len(which)):
         if which[i] >= 0:
@@ -91,7 +91,7 @@ def _flows(
 
 @inlined
 def _between(time_s: Floats, per_s: Floats, k: int, t_s: float) -> float:
-    """Return the rate at an instant between the one before ``k`` and that; beyond, at the end."""
+    """Return the rate at an instant between ``k - 1`` and ``k``; outside, that of the nearest."""
     if k == 0:
         return float(per_s[0])
     if k == len(time_s):

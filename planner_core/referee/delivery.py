@@ -1,8 +1,8 @@
-"""When images are on the ground: the recorder's queue, first in, first out.
+"""When images are on the ground: the recorder is a queue, first in, first out.
 
-Telemetry waits in the queue as images do. An image is down with its last bit, that is once as
-much was removed from the recorder as had been recorded when the image ended, and not before the
-next contact takes down data.
+Telemetry waits in the queue as images do. An image is down when its last bit is: once as much
+has been removed from the recorder as had been recorded by the end of the image, and not before
+the next contact takes down data.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.contact_flow import flow
 from planner_core.referee.resource_profile import Profile
 
-_AMOUNT_TOLERANCE: Final = 1e-9  # of a recorder's capacity, in comparing sums of many pieces
+_AMOUNT_TOLERANCE: Final = 1e-9  # of a recorder's capacity, for comparing sums of many pieces
 
 
 def delivered_s(
@@ -32,9 +32,9 @@ def delivered_s(
     Parameters
     ----------
     own
-        Actions of the satellite.
+        The satellite's actions.
     profile
-        Its resources under them.
+        Its resources while it carries them out.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def delivered_s(
     contacts = list(itertools.compress(own.actions, is_contact.tolist()))
     found[is_contact] = np.nan
     end_s = own.columns.end_s
-    # Of an image without data all is down before it is taken: it waits for a contact all the same.
+    # An image without data would be down before it is taken; it too waits for the next contact.
     for image in np.flatnonzero(found < end_s - TIME_TOLERANCE_S).tolist():
         found[image] = _next_flow_s(problem, satellite, contacts, end_s[image])
     return found
@@ -54,7 +54,7 @@ def delivered_s(
 def _next_flow_s(
     problem: Problem, satellite: SatelliteProblem, contacts: Sequence[Action], after_s: float
 ) -> float:
-    """Return when data can come down in a contact that begins then or later; NaN for never."""
+    """Return when the first contact that starts at ``after_s`` or later takes data down, or NaN."""
     later = [action for action in contacts if action.start_s >= after_s - TIME_TOLERANCE_S]
     flows = [flow(problem, satellite, action) for action in later]
     return min((float(pieces[0, 0]) for pieces in flows if len(pieces)), default=math.nan)
@@ -67,21 +67,21 @@ def on_ground_s(
     profile: Profile,
     queued: Floats,
 ) -> Floats:
-    """Return when so much of a recorder's queue is on the ground; see ``down_s``."""
+    """Return when these amounts of a recorder's queue are on the ground; see ``down_s``."""
     time_s, removed = _removal(problem, satellite, actions, profile)
     return down_s(queued, time_s, removed)
 
 
 def down_s(queued: Floats, time_s: Floats, removed: Floats) -> Floats:
-    """Return when so much is down.
+    """Return when the given amounts of the queue are down.
 
     Parameters
     ----------
     queued
-        What had been recorded when something was written, it included: what a recorder holds at
-        the start counts from 0 too, oldest first. Any order; shape ``(k,)``.
+        For each item, all that had been recorded up to and including it. This also counts what
+        the recorder holds at the start, oldest first. Any order; shape ``(k,)``.
     time_s, removed
-        What has been taken down by when, in order of time and linear in between. Shape ``(n,)``.
+        How much has been taken down by each instant, in time order; linear in between. ``(n,)``.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def down_s(queued: Floats, time_s: Floats, removed: Floats) -> Floats:
 
 @kernel
 def _between(queued: Floats, time_s: Floats, removed: Floats, reached: Longs) -> Floats:
-    """Return when so much is down, given the first place at which as much is."""
+    """Return when the amounts are down; ``reached`` is the first index with that much removed."""
     found = np.full(len(queued), np.nan)
     for i in range(len(queued)):
         if reached[i] == len(removed):
@@ -114,10 +114,10 @@ def _between(queued: Floats, time_s: Floats, removed: Floats, reached: Longs) ->
 def _removal(
     problem: Problem, satellite: SatelliteProblem, actions: Sequence[Action], profile: Profile
 ) -> tuple[Floats, Floats]:
-    """Return what has been removed by when, linear in between."""
+    """Return instants and how much has been removed by each, linear in between."""
     if problem.dynamics == "physical":
         return profile.curve.time_s, profile.curve.removed
-    # Events book a contact at its start: its bits come down one after another from there.
+    # The paper's events book a contact at its start; here its bits come down one after another.
     points = [(0.0, 0.0)]
     for action, before, after in zip(
         actions, profile.before.removed.tolist(), profile.after.removed.tolist(), strict=True
@@ -130,7 +130,7 @@ def _removal(
 
 
 def _one_after_another(pieces: Floats, before: float, after: float) -> list[tuple[float, float]]:
-    """Return what a contact has removed by when, from its first bit to its last."""
+    """Return points (instant, removed so far) of a contact, from its first bit to its last."""
     points = [(float(pieces[0, 0]), before)]
     removed = before
     for from_s, to_s, per_s in pieces.tolist():

@@ -1,4 +1,4 @@
-"""What a satellite does between its tasks: it turns to the sun and back, or it waits."""
+"""Idle time: between its tasks a satellite turns to the sun and back, or it waits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from planner_core.problem.sun_turns import SunTurns, sun_turn_s, sun_turns
 from planner_core.referee.sight import lines_of_sight
 
 _known: WeakKeyDictionary[Problem, Floats] = WeakKeyDictionary()
-"""Turns from each opportunity to the sun, and back; NaN for those that nobody asked for yet."""
+"""Turns from each opportunity to the sun, and back; NaN if not computed yet."""
 
 
 class Idle(NamedTuple):
@@ -25,11 +25,11 @@ class Idle(NamedTuple):
     Attributes
     ----------
     start_s, end_s
-        From the end of a task, or the start of the horizon, to the next start or its end.
+        From the end of a task (or the start of the horizon) to the next start (or its end).
     sun_from_s, sun_until_s
-        The stay at the sun, between the two turns; of no length where there is no time for it.
+        The stay at the sun, between the two turns; of zero length if there is no time for it.
     turn_to_s, turn_back_s
-        To the sun, at the start of the horizon what is left of it; and from it, none at its end.
+        Turn to the sun (in the first span, what is left of it) and back (none in the last).
     """
 
     start_s: Floats
@@ -46,14 +46,13 @@ class Idle(NamedTuple):
 
 
 def idle_spans(problem: Problem, satellite: SatelliteProblem, actions: Columns) -> Idle:
-    """Return the idle spans of a satellite around its own actions, in order of start.
+    """Return the idle spans of a satellite between its own actions, in order of start.
 
-    The satellite begins the horizon with its panels at the sun where it is not known to look
-    elsewhere.
+    The satellite begins the horizon with its panels at the sun, unless its heading says otherwise.
     """
     out_s, back_s = _turns_s(problem, satellite, actions)
     until_s, turn_back_s = np.append(actions.start_s, problem.horizon_s), np.append(back_s, 0.0)
-    # Of the start of the horizon and the tasks before, the first that ends last.
+    # Among the start of the horizon and the tasks so far: the first of those that end last.
     end_s = np.append(0.0, actions.end_s)
     free_from_s = np.maximum.accumulate(end_s)
     is_later = np.append(True, free_from_s[1:] > free_from_s[:-1])
@@ -69,10 +68,10 @@ def idle_spans(problem: Problem, satellite: SatelliteProblem, actions: Columns) 
 def _turns_s(
     problem: Problem, satellite: SatelliteProblem, actions: Columns
 ) -> tuple[Floats, Floats]:
-    """Return the turn from each action to the sun, and the one from there to it.
+    """Return the turns from each action to the sun, and from the sun to each action.
 
-    From one plan of a search to the next most actions stay. The turns of those that are at the
-    instants of their opportunity are remembered.
+    Most actions are the same in successive plans of a search, so the turns of those at the times
+    of their opportunity are remembered.
     """
     if satellite.resources.sun_pointing == "free":
         nothing = np.zeros(len(actions.row))
@@ -107,7 +106,7 @@ def _new_turns_s(problem: Problem, satellite: SatelliteProblem, actions: Columns
 
 
 def _first_turn_s(satellite: SatelliteProblem) -> float:
-    """Return how long after the horizon's start a satellite is at the sun, by its heading."""
+    """Return how long after the horizon's start a satellite is at the sun, given its heading."""
     heading = satellite.heading
     if heading is None or heading.line_of_sight is None:
         return 0.0

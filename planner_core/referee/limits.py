@@ -1,4 +1,4 @@
-"""Battery and recorder beyond their limits: when, by whom, and whether any plan could help it."""
+"""Battery and recorder beyond their limits: when, caused by which actions, and if avoidable."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _Check = tuple[
 def limits_broken(
     problem: Problem, plan: Plan, index: int, positions: Sequence[int], profile: Profile
 ) -> list[Violation]:
-    """Battery stays strictly above its minimum, recorder strictly below its maximum.
+    """Check that battery stays strictly above its minimum and recorder strictly below its maximum.
 
-    From a state beyond a limit, actions that do not worsen it break nothing: a contact that
-    empties a recorder which was too full at the start is the way back. So it is where what is
-    frozen leads there. What is frozen is to blame where it finds no room or energy at all.
+    If the horizon begins beyond a limit, only actions that make it worse break it: a contact that
+    empties an overfull recorder is the way back. The same holds if frozen actions lead beyond the
+    limit. A frozen action is blamed only if it leaves the battery empty or the recorder full.
     """
     r = problem.satellites[index].resources
 
@@ -97,17 +97,17 @@ def limits_broken(
 
 
 def is_empty(point: Point) -> bool:
-    """Return whether there is no energy at all."""
+    """Return whether the battery is empty."""
     return point.battery <= 0.0
 
 
 def has_no_room(point: Point) -> bool:
-    """Return whether data is lost."""
+    """Return whether the recorder is full, so that data is lost."""
     return point.recorder >= 1.0
 
 
 class _Part(NamedTuple):
-    """An action that touches a limit: whether it makes it worse, and whether it had to be flown."""
+    """An action at a limit: whether it makes it worse, and whether it is frozen (not to blame)."""
 
     position: int
     start_s: float
@@ -119,7 +119,7 @@ class _Part(NamedTuple):
 def _excursions(
     problem: Problem, curve: Curve, code: str, limit: float
 ) -> list[tuple[float, float, float, float]]:
-    """Return (start, end, value at the start, worst) of each stay at or beyond a limit."""
+    """Return (start, end, value at the start, worst value) of each time at or beyond a limit."""
     sign, values = (-1.0, curve.battery) if code == "battery" else (1.0, curve.recorder)
     is_broken = sign * (values - limit) >= 0.0
     if not is_broken.any():

@@ -1,4 +1,4 @@
-"""Whether a plan honours what the scenario pins, and what is out; the referee asks."""
+"""The referee's check that a plan honours pins, outages and the freeze of a replan."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from planner_core.referee.timeline import Violation, ViolationCode
 
 
 def breaches(problem: Problem, plan: Plan) -> list[Violation]:
-    """Return every kept action that is missing and every action that is ruled out."""
+    """Return a violation for each kept action that is missing and each action ruled out."""
     pinned, table = problem.pinned, problem.opportunities
     starts = {action.opportunity: action.start_s for action in plan.actions}
     found = [

@@ -1,4 +1,4 @@
-"""What changed from one plan to another: actions, and what they add up to."""
+"""What changed from one plan to another: actions and totals."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SAME_TIME: Final = timedelta(milliseconds=1)
 
 @dataclass(frozen=True, slots=True, kw_only=True, order=True)
 class PlannedAction:
-    """A collect or a contact in terms that every plan of these satellites shares."""
+    """A collect or a contact in terms that do not depend on one problem's indices."""
 
     start: datetime
     end: datetime
@@ -28,7 +28,7 @@ class PlannedAction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanView:
-    """What two plans are compared by; ``totals`` are numbers, or None where unknown."""
+    """The parts of a plan that are compared; ``totals`` are numbers, or None if unknown."""
 
     actions: tuple[PlannedAction, ...]
     totals: Mapping[str, float | None]
@@ -72,15 +72,15 @@ class PlanView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanDiff:
-    """What the second plan has that the first has not, and the other way round.
+    """The difference between two plans.
 
     Attributes
     ----------
     moved
-        The same target, or the same satellite's contact of the same station, at another time
-        (or the target by another satellite): before and after.
+        Pairs (before, after): the same target at another time or by another satellite, or the
+        same satellite's contact with the same station at another time.
     totals
-        Second minus first, only what differs; None where one of them does not know.
+        Second minus first, where they differ; None if one of the two is unknown.
     """
 
     added: tuple[PlannedAction, ...]
@@ -95,7 +95,7 @@ class PlanDiff:
 
 
 def plan_diff(first: PlanView, second: PlanView) -> PlanDiff:
-    """Return the difference of two plans; that of a plan and itself is empty."""
+    """Return the difference between two plans; it is empty for a plan and itself."""
     before, after = _without_common(first.actions, second.actions)
     there = _grouped(after, _site)
     pairs = sorted((abs(a.start - b.start), a, b) for a in before for b in there.get(_site(a), ()))
@@ -117,7 +117,7 @@ def plan_diff(first: PlanView, second: PlanView) -> PlanDiff:
 def _without_common(
     first: tuple[PlannedAction, ...], second: tuple[PlannedAction, ...]
 ) -> tuple[list[PlannedAction], list[PlannedAction]]:
-    """Return what either has and the other has not, up to the millisecond of rounding."""
+    """Return the actions that only one plan has; times may differ by a millisecond (rounding)."""
     left = _grouped(second, _task)
     before = []
     for action in first:
@@ -148,7 +148,7 @@ def _task(action: PlannedAction) -> tuple[str, ...]:
 
 
 def _site(action: PlannedAction) -> tuple[str, ...]:
-    """Return what an action is still known by when it moves."""
+    """Return the key of an action that stays the same when it moves."""
     if action.mode == "collect":
         return action.mode, action.site_id
     return action.mode, action.site_id, action.satellite_id

@@ -1,6 +1,6 @@
-"""The referee: replay a plan, say what it earns and every rule that it breaks.
+"""The referee: replay a plan, report what it earns and every rule that it breaks.
 
-Only this module awards reward. It does not know which solver made a plan, and believes none.
+Only this module awards reward. It does not know which solver made a plan, and trusts none.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
     Parameters
     ----------
     in_detail
-        Whether actions and curves are listed by satellite; a search needs the verdict alone.
+        Whether to list actions and curves by satellite; a search needs only the verdict.
     """
     order, by_satellite = _in_order(problem, plan)
     alone = [
@@ -105,7 +105,7 @@ def replay(problem: Problem, plan: Plan, *, in_detail: bool = True) -> Timeline:
 
 
 def _in_order(problem: Problem, plan: Plan) -> tuple[Longs, list[list[int]]]:
-    """Return the positions of all actions in order, and those of each satellite."""
+    """Return the positions of all actions in time order, and those of each satellite."""
     columns = plan.columns
     order = columns.order
     satellite = problem.opportunities.satellite[columns.row[order]]
@@ -116,7 +116,7 @@ def _in_order(problem: Problem, plan: Plan) -> tuple[Longs, list[list[int]]]:
 def _placed(
     violations: Iterable[Sequence[Violation]], by_satellite: Sequence[Sequence[int]]
 ) -> Iterator[Violation]:
-    """Yield what satellites break alone, with the positions of those to blame in the plan."""
+    """Yield violations found per satellite, with ``blamed`` as positions in the whole plan."""
     for found, positions in zip(violations, by_satellite, strict=True):
         for one in found:
             yield replace(one, blamed=tuple(positions[own] for own in one.blamed))
@@ -130,9 +130,9 @@ def _collected(
     worth: Floats,
     down_s: Floats,
 ) -> tuple[dict[int, Collected], list[Violation]]:
-    """Return the best unbroken collect of each target, and a warning for each other one.
+    """Return the best collect of each target that breaks nothing, and warnings for the others.
 
-    Of equal ones the first is the best.
+    Of equally good collects the first counts.
     """
     table, columns = problem.opportunities, plan.columns
     is_image = table.kind[columns.row] == COLLECT
@@ -174,7 +174,7 @@ def _or_none(values: Floats) -> list[float | None]:
 def _beside_better(
     problem: Problem, plan: Plan, positions: Sequence[int], best: int
 ) -> list[Violation]:
-    """Return a warning for each image of a target but the best."""
+    """Return a warning for each image of a target except the best."""
     found = []
     why = "has a better image later"
     for position in positions:
@@ -202,7 +202,7 @@ def _has_been_imaged(problem: Problem, plan: Plan, position: int) -> Violation:
 
 
 def _worth(problem: Problem, plan: Plan, down_s: Floats) -> Floats:
-    """Return what the image of each action earns by itself, 0 for contacts."""
+    """Return what the image of each action would earn alone; 0 for contacts."""
     rows = plan.columns.row
     if not problem.counts_delivery:
         return problem.worth[rows]
@@ -211,7 +211,7 @@ def _worth(problem: Problem, plan: Plan, down_s: Floats) -> Floats:
 
 
 class _Images(NamedTuple):
-    """What the image of each action earns in the plan and by itself, and when it is down."""
+    """What the image of each action earns in the plan and would earn alone; when it is down."""
 
     earned: Mapping[int, float]
     worth: Floats
@@ -256,7 +256,7 @@ def _satellite_timeline(
         return SatelliteTimeline(actions=tuple(actions), resources=None)
     time_s, battery, recorder = thin(profile.curve)
     idle = _idle_actions(profile.idle, profile.sun_end)
-    # Of a task and what is idle at one instant, as of overlapping tasks, the earlier stands first.
+    # The merge is stable: if a task and idle time start at the same instant, the task comes first.
     actions = list(heapq.merge(actions, idle, key=lambda action: action.start_s))
     return SatelliteTimeline(
         actions=tuple(actions),
@@ -265,7 +265,7 @@ def _satellite_timeline(
 
 
 def _idle_actions(idle: Idle, left: Curve) -> list[JudgedAction]:
-    """Return stays at the sun, and waits where there is no time for one."""
+    """Return sun-pointing, or a hold where there is no time for it, for each idle span."""
     at_sun = idle.is_at_sun
     columns = (
         at_sun,

@@ -1,7 +1,7 @@
 """Battery and recorder of one satellite over a plan, integrated for the referee.
 
-Solvers step from task to task with the lumps of ``planner_core.mdp.track``. The referee does not
-trust them: it integrates every second here, piece by piece, in its own way.
+Solvers step from task to task with the lump sums of ``planner_core.mdp.track``. The referee does
+not trust them: it integrates the whole horizon here, piece by piece, independently.
 """
 
 from __future__ import annotations
@@ -64,13 +64,13 @@ class Profile:
     Attributes
     ----------
     curve
-        Limits need to be tested at its instants only.
+        It is enough to test limits at its instants.
     before, after
-        The states in which actions start, and those that they leave.
+        The states at the start and the end of each action.
     idle
         What the satellite does between its actions, in order.
     sun_end
-        The states in which it leaves the sun in each of these spans.
+        The state at the end of the stay at the sun in each idle span.
     """
 
     curve: Curve
@@ -81,17 +81,17 @@ class Profile:
 
 
 def integrate(problem: Problem, satellite: SatelliteProblem, own: Plan) -> Profile:
-    """Return the resources of ``satellite`` under its own actions."""
+    """Return the resources of ``satellite`` while it carries out its own actions."""
     if problem.dynamics == "physical":
         return _integrate_physical(problem, satellite, own.columns)
     return _integrate_events(problem, satellite, own)
 
 
 def _integrate_physical(problem: Problem, satellite: SatelliteProblem, columns: Columns) -> Profile:
-    """Integrate over all time: each mode at its power and rate, and the sun in between.
+    """Integrate over the horizon: each mode at its power and rate, sun-pointing in between.
 
-    Panels charge in sunlight during the part of each idle span that is spent at the sun;
-    turns and waiting charge nothing.
+    Panels charge in sunlight during the part of each idle span that is spent at the sun, and
+    not during turns and holds.
     """
     r, horizon_s = satellite.resources, problem.horizon_s
     is_contact = problem.opportunities.kind[columns.row] == CONTACT
@@ -111,7 +111,7 @@ def _integrate_physical(problem: Problem, satellite: SatelliteProblem, columns: 
             (idle.sun_from_s, idle.sun_until_s),
         )
     ]
-    # Between these times rates are constant.
+    # Rates are constant between these times.
     times = np.unique(np.concatenate([[0.0, horizon_s], *(span.ravel() for span in spans)]))
     tasks, flowing, sunlit, at_sun = (indices_of(times, span) for span in spans)
     power, fill, drain = _rates_over(
@@ -132,9 +132,9 @@ def _integrate_physical(problem: Problem, satellite: SatelliteProblem, columns: 
 
 @kernel
 def indices_of(times: Floats, spans: Floats) -> Longs:
-    """Return where each end of some spans stands among ``times``, which hold them all.
+    """Return the index in ``times`` of both ends of each span; ``times`` contains them all.
 
-    Ends come up nearly in order: from one to the next it is a step or two.
+    The ends are nearly sorted, so going from one to the next takes a step or two.
     """
     found = np.empty(spans.shape, dtype=np.int64)
     at = 0
@@ -149,7 +149,7 @@ def indices_of(times: Floats, spans: Floats) -> Longs:
 
 
 class _Rates(NamedTuple):
-    """What each mode takes and gives, in capacities per second."""
+    """What each mode consumes and supplies, in capacities per second."""
 
     collect_drain: float
     contact_drain: float
@@ -170,12 +170,12 @@ def _rates_over(
     at_sun: Longs,
     each: _Rates,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return power, fill and drain in each piece of time.
+    """Return battery power, recorder fill and recorder drain in each piece of time.
 
     Parameters
     ----------
     tasks, flowing, sunlit, at_sun
-        Spans of pieces: the first, and the one after the last. Shape ``(n, 2)`` each.
+        Spans of pieces: the first, and one past the last. Shape ``(n, 2)`` each.
     per_s
         How fast data comes down in each span of ``flowing``. Shape ``(n,)``.
     """
@@ -204,8 +204,8 @@ def _rates_over(
 def _cover(covered: Floats, spans: Longs, i: int, weight: float) -> None:
     """Add a weight to each piece of span ``i``.
 
-    Only what covers a piece is summed: a difference of running sums would leave roundings where
-    there is nothing.
+    Each piece sums only what covers it: a difference of running sums would leave rounding errors
+    in pieces that nothing covers.
     """
     for piece in range(spans[i, 0], spans[i, 1]):
         covered[piece] += weight
@@ -215,7 +215,7 @@ def _cover(covered: Floats, spans: Longs, i: int, weight: float) -> None:
 def states_under(
     times: Floats, power: Floats, fill: Floats, drain: Floats, first: _State
 ) -> tuple[Floats, Longs]:
-    """Return the states under the rates of each piece, and which of them stands at each time."""
+    """Return the states given the rates of each piece, and the index of the state at each time."""
     states = np.empty((_STATES_IN_PIECE * len(times), 5))
     at = np.empty(len(times), dtype=np.int64)
     states[0] = first
@@ -232,7 +232,7 @@ def states_under(
 
 @inlined
 def advance(point: _State, until_s: float, power: float, fill: float, drain: float) -> _State:
-    """Return the state at ``until_s``, or earlier where battery or recorder reach an end stop."""
+    """Return the state at ``until_s``, or earlier if battery or recorder is then full or empty."""
     time_s, battery, recorder, recorded, removed = point
     if (power > 0 and battery >= 1.0) or (power < 0 and battery <= 0.0):
         power = 0.0
@@ -244,7 +244,7 @@ def advance(point: _State, until_s: float, power: float, fill: float, drain: flo
     for value, rate in ((battery, power), (recorder, net)):
         if rate != 0.0:
             to_stop_s = ((1.0 if rate > 0 else 0.0) - value) / rate
-            # The last bit of rounding must not leave an endless row of tiny pieces.
+            # Rounding errors must not cause an endless sequence of tiny pieces.
             if to_stop_s < dt - 1e-9:
                 dt = max(to_stop_s, 1e-9)
                 stop_s = time_s + dt
@@ -256,7 +256,7 @@ def advance(point: _State, until_s: float, power: float, fill: float, drain: flo
 
 
 def _integrate_events(problem: Problem, satellite: SatelliteProblem, own: Plan) -> Profile:
-    """Walk the authors' events: every opportunity's start, taken or sun-pointed towards."""
+    """Walk through the paper's events, the starts of opportunities: taken, or sun-pointing."""
     r, actions = satellite.resources, own.actions
     taken: dict[int, list[int]] = {}
     for position, action in enumerate(actions):
@@ -311,7 +311,7 @@ def _book(
     t_s: float,
     telemetry: float,
 ) -> Point:
-    """Book a whole task at its start, with the telemetry since the event before."""
+    """Book a whole task at its start, with the telemetry since the previous event."""
     r = satellite.resources
     duration_s = action.end_s - action.start_s
     if problem.opportunities.kind[action.opportunity] == CONTACT:
@@ -343,7 +343,7 @@ def thin(curve: Curve) -> tuple[Floats, Floats, Floats]:
 
 @kernel
 def _kept(time_s: Floats, battery: Floats, recorder: Floats) -> Bools:
-    """Return which points do not lie on the line from the last one kept to the next one."""
+    """Return which points do not lie on the line from the last kept point to the next point."""
     kept = np.ones(len(time_s), dtype=np.bool_)
     last = 0
     for i in range(1, len(time_s) - 1):

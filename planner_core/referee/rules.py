@@ -1,4 +1,4 @@
-"""The rules that a plan must keep, beside its pins and limits: windows, turns and stations."""
+"""The rules that a plan must keep, besides pins and limits: windows, turns and stations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from planner_core.referee.timeline import Slew, Violation, ViolationCode
 
 
 def windows(problem: Problem, plan: Plan) -> list[Violation]:
-    """Each action lies in its access and in the horizon, and has its opportunity's length."""
+    """Check that each action lies in its access and the horizon, and lasts as its opportunity."""
     table = problem.opportunities
     found = []
     for position in _outside(problem, plan):
@@ -45,7 +45,7 @@ def windows(problem: Problem, plan: Plan) -> list[Violation]:
 
 
 def _outside(problem: Problem, plan: Plan) -> list[int]:
-    """Return the positions of actions that do not keep to their opportunity."""
+    """Return the positions of actions that do not match their opportunity."""
     table, columns = problem.opportunities, plan.columns
     row, start_s, end_s = columns.row, columns.start_s, columns.end_s
     first_s = np.maximum(table.access_start_s[row], 0.0)
@@ -59,7 +59,7 @@ def _outside(problem: Problem, plan: Plan) -> list[int]:
 
 
 def turns(problem: Problem, plan: Plan, index: int, positions: Sequence[int]) -> list[Violation]:
-    """Tasks of one satellite neither overlap nor follow faster than it turns: C(a, b)."""
+    """Check that a satellite's tasks do not overlap and leave time for its turns: C(a, b)."""
     found = _first_turns(problem, index, [plan.actions[p] for p in positions], positions)
     columns = plan.columns.at(np.asarray(positions, dtype=np.int64))
     before, after = columns.at(slice(-1)), columns.at(slice(1, None))
@@ -90,7 +90,7 @@ def turns(problem: Problem, plan: Plan, index: int, positions: Sequence[int]) ->
 def _first_turns(
     problem: Problem, index: int, actions: Sequence[Action], positions: Sequence[int]
 ) -> list[Violation]:
-    """No task begins before its satellite can have turned to it from where it looked at first."""
+    """Check that each task leaves time for the turn from the line of sight at the start."""
     found: list[Violation] = []
     if problem.satellites[index].heading is None:
         return found
@@ -110,7 +110,7 @@ def _first_turns(
 
 
 def slews(problem: Problem, index: int, actions: Sequence[Action]) -> list[Slew | None]:
-    """Return the turn before each action of a satellite, in order; of the first where known."""
+    """Return the turn before each action of a satellite; None before the first if unknown."""
     columns = Columns.of(actions)
     before, after = columns.at(slice(-1)), columns.at(slice(1, None))
     turned = turns_between(problem, index, before, after)
@@ -125,7 +125,7 @@ def slews(problem: Problem, index: int, actions: Sequence[Action]) -> list[Slew 
 
 
 def _first_slew(problem: Problem, index: int, action: Action) -> Slew | None:
-    """Return the turn to an action from where its satellite looked at the start, if known."""
+    """Return the turn to an action from the line of sight at the start, if that is known."""
     heading, turn = problem.satellites[index].heading, turn_from_start(problem, index, action)
     if heading is None or turn is None:
         return None
@@ -134,7 +134,7 @@ def _first_slew(problem: Problem, index: int, action: Action) -> Slew | None:
 
 
 def stations(problem: Problem, plan: Plan) -> list[Violation]:
-    """Check that no station serves more satellites at a time than it has antennas."""
+    """Check that no station serves more satellites at once than it has antennas."""
     table = problem.opportunities
     found = []
     busy: dict[int, list[float]] = {}

@@ -1,4 +1,4 @@
-"""Where a satellite looks when it begins an action and when it ends it, and how long it turns."""
+"""Lines of sight at the start and end of actions, and how long the turns between them take."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _Triple = tuple[float, float, float]
 
 
 class _Turns(NamedTuple):
-    """A satellite's turns and its agility; without rates at their ends from rest to rest."""
+    """A satellite's turns and its agility; turns without rates go from rest to rest."""
 
     lines_from: Floats
     lines_to: Floats
@@ -36,7 +36,7 @@ class _Turns(NamedTuple):
 
 
 def lines_of_sight(problem: Problem, actions: Columns, *, is_end: bool) -> tuple[Floats, Floats]:
-    """Return lines of sight at starts or ends of actions, and how they move; ``(n, 3)`` each."""
+    """Return lines of sight at starts or ends of actions, and their rates; ``(n, 3)`` each."""
     table = problem.opportunities
     rows = actions.row
     if is_end:
@@ -52,9 +52,9 @@ def lines_of_sight(problem: Problem, actions: Columns, *, is_end: bool) -> tuple
 
 
 def are_in_time(problem: Problem, index: int, before: Columns, after: Columns) -> Bools:
-    """Return which turns of a satellite surely fit between the actions that they lead between.
+    """Return which turns of a satellite surely fit between their two actions.
 
-    The least time of a turn is found by halving. Whether it fits is one step of that.
+    The shortest time of a turn takes a bisection to find; whether it fits is a single step of it.
     """
     return _fit(*_turns_asked(problem, index, before, after))
 
@@ -109,7 +109,7 @@ def turns_between(
 ) -> list[tuple[float, float]]:
     """Return angle (deg) and time (s, settling included) of a satellite's turns.
 
-    Each leads from the end of one action to the start of another.
+    Each goes from the end of an action to the start of another.
     """
     angles_deg, needed_s = _angles_and_times(*_turns_asked(problem, index, before, after))
     return list(zip(angles_deg.tolist(), needed_s.tolist(), strict=True))
@@ -145,15 +145,15 @@ def _angles_and_times(
         if needed_s[i] > available_s[i] and turns_in(
             room_s, turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2
         ):
-            # The least time is known to a microsecond or so; what fits, fits.
+            # The shortest time is only accurate to about a microsecond: a turn that fits counts.
             needed_s[i] = available_s[i]
     return angles_deg, needed_s
 
 
 def turn_from_start(problem: Problem, index: int, action: Action) -> tuple[float, float] | None:
-    """Return angle (deg) and time (s) of the turn from where a satellite looked at the start.
+    """Return angle (deg) and time (s) of the turn from the line of sight at the start.
 
-    None where that is not known. For panels at the sun the angle is the one that they turn by.
+    None if that is unknown. If the panels begin at the sun, the angle is the one they turn by.
     """
     satellite = problem.satellites[index]
     heading, agility = satellite.heading, satellite.agility

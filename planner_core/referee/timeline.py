@@ -1,4 +1,4 @@
-"""What the referee says of a plan: what each satellite does, what is earned, what is broken."""
+"""The referee's verdict on a plan: what each satellite does, what it earns, what it breaks."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class Violation:
     at_s
         When, in seconds from the start of the horizon.
     needed, available
-        What the rule asks for and what the plan leaves: seconds, or fractions of capacity.
+        What the rule demands and what the plan provides: seconds, or fractions of capacity.
     blamed
         Positions in ``plan.actions`` of the actions that break it; those earn nothing.
     inherited
-        Whether no plan could help it: it held at the start, or what is frozen leads to it; and no
-        action that was free to go has a part in it.
+        Whether no plan could avoid it: it holds at the start or frozen actions lead to it, and
+        none of the other actions contributes to it.
     """
 
     code: ViolationCode
@@ -68,11 +68,11 @@ class JudgedAction:
     Attributes
     ----------
     worth
-        Of a collect: what its image earns by itself.
+        For a collect: what its image would earn alone.
     delivered_s
-        Of a collect: when its last bit is on the ground; None for never.
+        For a collect: when its last bit is on the ground; None for never.
     turn_to_s, turn_back_s
-        Of sun-pointing: the turn to the sun that ends at its start, and the one from its end.
+        For sun-pointing: the turn to the sun that ends at its start, and the one from its end.
     """
 
     mode: Mode
@@ -101,7 +101,7 @@ class Resourceline:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SatelliteTimeline:
-    """What one satellite does, and its resources (None where they do not count)."""
+    """What one satellite does, and its resources (None if the problem ignores them)."""
 
     actions: tuple[JudgedAction, ...]
     resources: Resourceline | None
@@ -110,7 +110,7 @@ class SatelliteTimeline:
 class Collected(NamedTuple):
     """How a target was collected: by which plan action, and whether its image is down.
 
-    A tuple, as a search that asks for verdicts has thousands of each made.
+    It is a tuple because each verdict that a search asks for creates thousands of them.
 
     Attributes
     ----------
@@ -139,17 +139,17 @@ class Timeline:
     Attributes
     ----------
     reward
-        Sum over targets of the best worth of their collects by actions that break nothing, and
-        of what images earn that were on board at the start.
+        Sum over targets of the best worth among their collects that break nothing, plus what
+        images on board at the start earn.
     collected
         By target index.
     downlinked, on_board
-        What contacts took down, and what is in the recorder at the end, by satellite, in recorder
-        capacities.
+        What contacts took down, and what is in the recorder at the end; by satellite, in
+        recorder capacities.
     battery_min, recorder_max
         The lowest battery and the highest recorder of any satellite at any instant.
     brought_down
-        Of each image that a recorder held at the start, in the problem's order.
+        For each image that a recorder held at the start, in the problem's order.
     """
 
     satellites: tuple[SatelliteTimeline, ...]
@@ -164,17 +164,17 @@ class Timeline:
 
     @property
     def earned_by_new(self) -> float:
-        """What the images of the plan itself earn."""
+        """What the images taken by the plan itself earn."""
         return math.fsum(image.worth for image in self.collected.values())
 
     @property
     def is_valid(self) -> bool:
-        """Whether nothing is broken; imaging a target twice is allowed, it earns nothing."""
+        """Whether nothing is broken; imaging a target twice is allowed but earns nothing."""
         return all(v.code == "duplicate" for v in self.violations)
 
     @property
     def validity(self) -> Literal["valid", "inherited", "violations"]:
-        """What is to be said of it: inherited violations are no fault of the plan."""
+        """The overall verdict; inherited violations are not the plan's fault."""
         if self.is_valid:
             return "valid"
         own = (v for v in self.violations if v.code != "duplicate" and not v.inherited)

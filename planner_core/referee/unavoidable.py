@@ -1,8 +1,8 @@
-"""What battery and recorder come to at best, whatever is planned after a freeze.
+"""The best levels that battery and recorder can reach, whatever is planned after a freeze.
 
-A plan that follows another one begins with what is flown. Where that leads beyond a limit no plan
-is to blame: battery and recorder are compared with what they are if nothing is added that draws
-energy or writes data, and every contact that is left takes data down.
+A replan begins with the actions that are flown anyway. If these lead beyond a limit, no plan is to
+blame. So battery and recorder are compared with the levels reached if nothing more draws energy or
+writes data, and every remaining contact takes data down.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def is_unavoidable(
 ) -> bool:
     """Return whether no plan is within a limit at an instant, or better there than ``level``.
 
-    True is proven: contacts may overlap here, and need neither energy nor turns.
+    True is proven, since contacts may overlap here and need neither energy nor turns.
     """
     if not problem.pinned.follows:
         return False
@@ -37,7 +37,7 @@ def is_unavoidable(
 
 
 def beyond_from_s(problem: Problem, index: int) -> float | None:
-    """Return when the recorder of a satellite is first too full in every plan; None for never."""
+    """Return when a satellite's recorder is first too full whatever the plan; None for never."""
     limit = problem.satellites[index].resources.recorder_max_fraction
     curve = _at_best(problem, index, "recorder")
     beyond_s = curve.time_s[curve.recorder >= limit]
@@ -56,13 +56,13 @@ def _at_best(problem: Problem, index: int, code: str) -> Curve:
 
 
 def _flown(problem: Problem, index: int) -> list[int]:
-    """Return what a satellite does in every plan."""
+    """Return the rows of a satellite that every plan holds."""
     table = problem.opportunities
     return [row for row in problem.kept_rows.tolist() if table.satellite[row] == index]
 
 
 def _contacts(problem: Problem, index: int) -> list[int]:
-    """Return the longest contact of each pass of a satellite."""
+    """Return the row of the longest contact in each pass of a satellite."""
     table = problem.opportunities
     rows = problem.satellites[index].rows
     rows = rows[table.kind[rows] == CONTACT]

@@ -1,4 +1,4 @@
-"""A plan as the referee sees it."""
+"""A plan together with the referee's verdict."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Resourceline, Timeline
 
 Judge = Callable[[Plan], Timeline]
-"""What says of a plan what the referee says."""
+"""A function that judges a plan as the referee does."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """A plan, judged, and what of it counts.
+    """A judged plan and the parts of it that count.
 
     Attributes
     ----------
     judge
-        Who judges further plans; the referee by default.
+        What judges further plans; the referee by default.
     """
 
     problem: Problem
@@ -34,12 +34,12 @@ class View:
 
     @classmethod
     def of(cls, problem: Problem, plan: Plan, judge: Judge | None = None) -> View:
-        """Return the plan, judged."""
+        """Return the plan with its verdict."""
         timeline = judge(plan) if judge else replay(problem, plan, in_detail=False)
         return cls(problem=problem, plan=plan, timeline=timeline, judge=judge)
 
     def of_another(self, plan: Plan) -> View:
-        """Return another plan, judged by who judged this one."""
+        """Return another plan, judged by the same judge."""
         return View.of(self.problem, plan, self.judge)
 
     @cached_property
@@ -49,12 +49,12 @@ class View:
 
     @cached_property
     def images(self) -> list[Action]:
-        """The collects that count, one of each target."""
+        """The collects that count, one per target."""
         return [self.plan.actions[image.position] for image in self.timeline.collected.values()]
 
     @cached_property
     def image_rows(self) -> Ints:
-        """Their opportunities."""
+        """The opportunities of ``images``."""
         return np.array([image.opportunity for image in self.images], dtype=np.int32)
 
     @cached_property
