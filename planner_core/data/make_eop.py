@@ -5,7 +5,7 @@
 
 The package carries ``finals2000A.all``, the daily Earth orientation of the IERS Rapid
 Service (measured, then predicted for a year), and the list of leap seconds. We keep the days
-from 2000 on, and of those what moves a satellite over the ground by a centimetre or more.
+from 2000 on, and only the values that move a satellite over the ground by a centimetre or more.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Pins: what a plan must hold and must not, in words and compiled into a problem."""
+"""Pins, what a plan must and must not hold: found by their names and compiled into a problem."""

@@ -1,9 +1,9 @@
 """Pins compiled into a problem, so that every solver honours them.
 
-What is ruled out leaves the table, and so does what could not stand beside a kept action:
-tasks of its satellite too close to turn, contacts of its antenna, other images of its target.
-What is left fits around all kept actions, and solvers need only take those (see
-``Track.next_kept`` and the programs' lower bounds).
+Opportunities that are ruled out leave the table, and so do those that conflict with a kept action:
+tasks of its satellite too close to turn, contacts on its antenna, other images of its target.
+All others fit around all kept actions, and solvers need only take those (see
+``Track.next_kept`` and the lower bounds of the mixed-integer programs).
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ Reasons = npt.NDArray[np.int8]
 
 
 def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
-    """Return the problem without what the pins rule out, and what nobody can turn to in time.
+    """Return the problem without opportunities that pins rule out or no first turn can reach.
 
     Raises
     ------
     InvalidScenario
-        ``pins_conflict`` where two pins exclude each other, ``pin_breaks_limits`` where battery
-        or recorder cannot bear one.
+        ``pins_conflict`` if two pins exclude each other, ``pin_breaks_limits`` if battery or
+        recorder cannot keep its limits with one.
     """
     pinned = replace(pinned, kept=_without_repeats(pinned.kept))
     in_outage, is_too_soon = rows_in_outages(problem, pinned), too_soon(problem)
@@ -86,7 +86,7 @@ def _without_repeats(kept: Iterable[Kept]) -> tuple[Kept, ...]:
 def _check_conflicts(
     problem: Problem, pinned: Pinned, is_ruled_out: Bools, is_too_soon: Bools
 ) -> None:
-    """Raise where a kept action is ruled out, or excludes another one."""
+    """Raise if a kept action is ruled out or excludes another one."""
     table = problem.opportunities
     ordered = sorted(pinned.kept, key=lambda kept: kept.row)
     rows = np.array([kept.row for kept in ordered], dtype=np.int64)
@@ -116,7 +116,7 @@ def _check_conflicts(
 
 
 def _cannot_follow(problem: Problem, rows: Longs) -> Bools:
-    """Return which of these ascending rows cannot follow the one before of their satellite."""
+    """Return which of these ascending rows cannot follow the previous row of their satellite."""
     found = np.zeros(len(rows), dtype=np.bool_)
     for index, satellite in enumerate(problem.satellites):
         own = np.flatnonzero(problem.opportunities.satellite[rows] == index)
@@ -126,7 +126,7 @@ def _cannot_follow(problem: Problem, rows: Longs) -> Bools:
 
 
 def _check_antennas(problem: Problem, contacts: Sequence[Kept]) -> None:
-    """Raise where a station is to serve more satellites than it has antennas for."""
+    """Raise if kept contacts need more antennas at once than a station has."""
     table = problem.opportunities
     rows = np.array([kept.row for kept in contacts], dtype=np.int64)
     site, start_s, end_s = table.site[rows], table.start_s[rows], table.end_s[rows]
@@ -149,12 +149,12 @@ def _conflict(kept: Kept, why: str) -> InvalidScenario:
 
 
 def _ruled_out(problem: Problem, pinned: Pinned, facts: Bools) -> Bools:
-    """Return the opportunities that are forbidden, skipped, blocked, out, too soon or no use.
+    """Return the opportunities that are ruled out: frozen, imaged before, forbidden, pinned out.
 
     Parameters
     ----------
     facts
-        Those that are out or too soon. Shape ``(n,)``.
+        Those in outages or too soon after the start to turn to; ruled out as well. Shape ``(n,)``.
     """
     table = problem.opportunities
     is_out = facts.copy()
@@ -172,7 +172,7 @@ def _ruled_out(problem: Problem, pinned: Pinned, facts: Bools) -> Bools:
 
 
 def _pins_that_rule_out(problem: Problem, pinned: Pinned) -> Iterator[tuple[str, Longs]]:
-    """Yield pins that skip or block, and the opportunities that each is about."""
+    """Yield each pin that skips or blocks, and the opportunities that it rules out."""
     for pointer, skipped in groupby(pinned.skipped, key=lambda row: pinned.skipped[row]):
         yield pointer, np.array(list(skipped))
     for blocked in pinned.blocked:
@@ -181,7 +181,7 @@ def _pins_that_rule_out(problem: Problem, pinned: Pinned) -> Iterator[tuple[str,
 
 
 def rows_in(problem: Problem, blocked: Blocked) -> Longs:
-    """Return the opportunities that a blocked span takes."""
+    """Return the opportunities that a blocked span rules out."""
     table = problem.opportunities
     whose = (
         table.satellite == blocked.satellite
@@ -197,7 +197,7 @@ def rows_in(problem: Problem, blocked: Blocked) -> Longs:
 
 
 def rows_in_outages(problem: Problem, pinned: Pinned) -> Bools:
-    """Return the opportunities that outages take."""
+    """Return which opportunities outages rule out. Shape ``(n,)``."""
     is_out = np.zeros(len(problem.opportunities), dtype=np.bool_)
     for blocked in pinned.blocked:
         if blocked.is_outage:
@@ -212,7 +212,7 @@ def _struck(
     table = problem.opportunities
     rows = np.flatnonzero(is_struck & (table.kind == COLLECT))
     rows = rows[np.argsort(table.site[rows], kind="stable")]
-    # What is struck for a kept action stands in one row or more of ``beside``, here by that row.
+    # An opportunity may conflict with several kept actions: find its pairs in ``beside``.
     order = np.argsort(beside.row, kind="stable")
     first = beside.row[order].searchsorted(rows)
     count = beside.row[order].searchsorted(rows, side="right") - first
@@ -233,6 +233,6 @@ def _struck(
 
 
 def _access_left(problem: Problem, part: Problem) -> Reasons:
-    """Return why targets have no collect, pins included."""
+    """Return why each target has no collect, with pins as a further cause."""
     is_lost = (problem.target_access == ACCESS_FOUND) & (np.diff(part.target_opportunities[1]) == 0)
     return np.where(is_lost, RULED_OUT, problem.target_access).astype(np.int8)

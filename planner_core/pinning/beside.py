@@ -1,4 +1,4 @@
-"""Which opportunities cannot stand beside actions that are kept."""
+"""Which opportunities conflict with kept actions."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Beside:
-    """Pairs of a kept action and an opportunity that cannot stand beside it, in that order.
+    """Pairs of a kept action and an opportunity that conflicts with it, sorted in that order.
 
     Attributes
     ----------
     position
-        Of the action among those that are kept. Shape ``(k,)``, as that of ``row``.
+        Position among the kept actions. Shape ``(k,)``, as for ``row``.
     """
 
     position: Longs
     row: Longs
 
     def of(self, position: int) -> Longs:
-        """Return the rows that cannot stand beside one of the kept actions."""
+        """Return the rows that conflict with one of the kept actions."""
         low, high = self.position.searchsorted([position, position + 1])
         return self.row[low:high]
 
 
 def excluded_by_kept(problem: Problem, kept: Sequence[Kept]) -> Beside:
-    """Return what cannot stand beside kept actions: too close to turn, no antenna, imaged twice.
+    """Return conflicts with kept actions: too close to turn, no antenna, target imaged twice.
 
-    What is kept itself is left out.
+    Conflicts between kept actions are left out.
     """
     table, n = problem.opportunities, len(problem.opportunities)
     rows = np.array([one.row for one in kept], dtype=np.int64)
@@ -65,7 +65,7 @@ def _images_of_the_same(problem: Problem, rows: Longs) -> tuple[Longs, Longs]:
 
 
 def _without_antenna(problem: Problem, rows: Longs) -> list[tuple[Longs, Longs]]:
-    """Return pairs of a kept contact and one that finds no antenna where kept ones run."""
+    """Return pairs of a kept contact and a contact for which kept ones leave no antenna."""
     table = problem.opportunities
     is_contact = table.kind == CONTACT
     pairs = []
@@ -79,7 +79,7 @@ def _without_antenna(problem: Problem, rows: Longs) -> list[tuple[Longs, Longs]]
 
 
 def _finds_none(problem: Problem, row: int, kept: Longs, others: Longs) -> Bools:
-    """Return which contacts of a station find no antenna where ``row`` and ``kept`` ones run."""
+    """Return which contacts of a station overlap ``row`` and get no antenna beside ``kept``."""
     table = problem.opportunities
     from_s = np.maximum(table.start_s[others], table.start_s[row])
     to_s = np.minimum(table.end_s[others], table.end_s[row])

@@ -1,6 +1,6 @@
-"""Whether battery and recorder can bear what pins ask for.
+"""Whether battery and recorder can keep their limits with the pins.
 
-Contacts alone decide it: an image takes energy and memory and gives none back.
+Only contacts can help: an image takes energy and memory and gives none back.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from planner_core.sorting import stable_order
 
-# After each task; of more, neighbours count as one that is as good as each.
+# Kept after each task; of more, neighbours are merged into one that is as good as each.
 _MAX_STATES: Final = 200
 
 
@@ -43,24 +43,24 @@ def check_limits(
     frozen: Sequence[Kept],
     facts: Bools,
 ) -> None:
-    """Raise where battery or recorder cannot bear what one satellite must or must not do.
+    """Raise if a satellite cannot keep the limits of battery or recorder with the pins.
 
-    Contacts may help; that satellites share antennas is left out, but for contacts that are kept.
-    Where no plan keeps the limits without pins either, as with what is out or what is frozen, they
-    are not to blame.
+    Contacts may help. Sharing of antennas between satellites is ignored, except for kept contacts.
+    If no plan keeps the limits without pins either, because of outages or frozen actions, pins are
+    not to blame.
 
     Parameters
     ----------
     problem
-        With all its opportunities.
+        The problem with all its opportunities.
     ruled_out
         Pins, and the opportunities that each rules out.
     asked
-        Actions that pins keep, and the opportunities that cannot stand beside each.
+        Actions that pins keep, and the opportunities that conflict with each.
     frozen
         Actions that are flown whatever is pinned.
     facts
-        Opportunities that are not to be had whatever is pinned. Shape ``(n,)``.
+        Opportunities that are not available whatever is pinned. Shape ``(n,)``.
 
     Raises
     ------
@@ -114,12 +114,12 @@ def _what_breaks(problem: Problem, kept: Sequence[Kept]) -> str:
 
 
 def can_keep(problem: Problem, index: int, kept: Sequence[Kept], missing: Bools) -> bool:
-    """Return whether a satellite may keep the limits by these and contacts; False is proven.
+    """Return whether a satellite may keep the limits with these and contacts; False is proven.
 
     Parameters
     ----------
     missing
-        Opportunities that are out of the question. Shape ``(n,)``.
+        Opportunities that are not available. Shape ``(n,)``.
     """
     satellite = problem.satellites[index]
     trial = replace(problem, pinned=Pinned(kept=tuple(kept)))
@@ -131,7 +131,7 @@ def can_keep(problem: Problem, index: int, kept: Sequence[Kept], missing: Bools)
 
 @kernel
 def _has_way(track: Track, precedence: Precedence) -> bool:
-    """Return whether some of the fallbacks, with all that must be taken, keep the limits."""
+    """Return whether some fallbacks, together with all kept tasks, keep the limits."""
     num_rows = len(track.fallbacks)
     battery = np.empty((num_rows, _MAX_STATES))
     recorder = np.empty((num_rows, _MAX_STATES))
@@ -176,7 +176,7 @@ def _has_way(track: Track, precedence: Precedence) -> bool:
 
 @inner
 def _lasts(resources: ResourceColumns, last: int, recorder: float) -> bool:
-    """Return whether the recorder has room for the telemetry to the end."""
+    """Return whether the recorder has room for the telemetry until the end."""
     data_from_s = resources.data_from_s[last] if last >= 0 else 0.0
     idle_s = max(0.0, resources.data_end_s - data_from_s)
     return recorder + resources.telemetry_per_s * idle_s < resources.recorder_max - STRICT
@@ -184,9 +184,9 @@ def _lasts(resources: ResourceColumns, last: int, recorder: float) -> bool:
 
 @kernel
 def _keep_best(found: Floats, battery: Floats, recorder: Floats) -> int:
-    """Fill in the states that no other one is as good as, the emptiest recorder first.
+    """Fill in the states that no other state dominates, the emptiest recorder first.
 
-    Where there are too many, some next to each other become one that has the best of them all.
+    If there are too many, neighbours are merged into one that has the best of each.
     """
     num_best = 0
     by_recorder = found[stable_order(found[:, 1].copy())]

@@ -27,7 +27,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
 def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
-    """Return the problem of a scenario with its pins, and first turns, compiled in.
+    """Return the problem of a scenario with pins and first turns compiled in.
 
     Raises
     ------
@@ -58,9 +58,9 @@ def pinned_problem(scenario: Scenario, problem: Problem) -> Problem:
 
 
 def with_frozen(scenario: Scenario, problem: Problem, pinned: Pinned, replan: Replan) -> Pinned:
-    """Return the pins with what starts before the freeze, and promises with a date.
+    """Return the pins with what is frozen, and without images too late for their promise.
 
-    An action of the base that an outage takes, or that is no longer offered, is not kept.
+    An action of the base that an outage rules out, or that is no longer offered, is not kept.
     """
     table = problem.opportunities
     frozen_until_s = scenario.horizon.offset_s(replan.freeze_until)
@@ -75,7 +75,7 @@ def with_frozen(scenario: Scenario, problem: Problem, pinned: Pinned, replan: Re
         if promise.image_by is not None:
             is_late |= table.end_s[own] > offset_s(promise.image_by) + TIME_TOLERANCE_S
         if promise.deliver_by is not None:
-            # At the earliest, whatever else is done.
+            # The earliest possible delivery, whatever the plan.
             down_s = table.end_s + least_age_s(problem) if down_s is None else down_s
             is_late |= down_s[own] > offset_s(promise.deliver_by) + TIME_TOLERANCE_S
         late |= {int(row): f"/replan/promises/{i}" for row in own[is_late]}
@@ -100,7 +100,7 @@ def _start_s(scenario: Scenario, replan: Replan, number: int) -> float:
 
 
 def resolve(scenario: Scenario, kept: Sequence[int], skipped: Sequence[Sequence[int]]) -> Pinned:
-    """Return the scenario's pins in terms of its problem, where these rows are meant."""
+    """Return the scenario's pins in terms of its problem, given the rows that they mean."""
     pins = scenario.pins
     satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
     targets = {target.id: i for i, target in enumerate(scenario.targets)}

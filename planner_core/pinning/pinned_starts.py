@@ -1,8 +1,8 @@
-"""Pins on a problem with continuous starts: kept actions at the starts that they were given.
+"""Pins on a problem with continuous starts: kept actions at the starts that they name.
 
-A kept collect becomes an opportunity at its own start. So do the starts right before and after
-it, and around blocked intervals and outages, of the accesses there: what only overlaps at the
-opportunities' own starts may still be imaged beside it.
+A kept collect becomes an opportunity at its own start. Accesses around it also get opportunities
+right before and after it, and likewise around blocked intervals and outages: a target whose
+opportunities all overlap it at their own starts may still be imaged beside it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
 def whole_accesses(problem: Problem) -> Opportunities:
-    """Return the table with each collect as long as its access, as pins see it here."""
+    """Return the table with each collect as long as its access: pins may name any start in it."""
     table = problem.opportunities
     is_collect = table.kind == COLLECT
     return replace(
@@ -50,12 +50,12 @@ def whole_accesses(problem: Problem) -> Opportunities:
 def with_pinned_starts(
     scenario: Scenario, problem: Problem, kept: list[int]
 ) -> tuple[Problem, list[int]]:
-    """Return the problem with the starts that pins ask for, and its rows of what is kept.
+    """Return the problem with the starts that pins need, and the rows of the kept actions in it.
 
     Parameters
     ----------
     kept
-        For each action to be kept an opportunity of its access.
+        For each kept action an opportunity of its access.
     """
     table, pins = problem.opportunities, scenario.pins
     rows: list[int] = []
@@ -95,9 +95,9 @@ def starts_of(problem: Problem, row: int) -> tuple[float, float]:
 
 
 def open_when_turned_to(problem: Problem, kept: list[int]) -> tuple[Problem, list[int]]:
-    """Return the problem whose accesses begin once their satellite can have turned to them.
+    """Return the problem with accesses that begin once their satellite can have turned to them.
 
-    Each of those is offered from then on as well. The rows of what is kept come with it.
+    Each access cut so also gets a collect at its new beginning. The kept rows are returned too.
     """
     table = problem.opportunities
     opens_s: dict[int, float] = {}
@@ -172,10 +172,10 @@ def _beside(
     open_s: Floats,
     close_s: Floats,
 ) -> tuple[Floats, Floats]:
-    """Return the latest start of each access before a task, and the earliest after it.
+    """Return the latest start in each access before a task, and the earliest after it.
 
-    ``task_s`` is when the task begins and ends, ``looks`` and ``looked`` where the satellite does.
-    Not finite where the task is not in the way of some start of the access.
+    ``task_s`` is when the task begins and ends, ``looks`` and ``looked`` its lines of sight then.
+    Not finite for accesses far from the task, or if there is no such start.
     """
     start_s, end_s = task_s
     before, after = np.full(len(target), -np.inf), np.full(len(target), np.inf)

@@ -1,4 +1,4 @@
-"""Which opportunities are meant by what pins and plans name."""
+"""Which opportunities the names in pins and plans mean."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ KINDS = {"collect": COLLECT, "contact": CONTACT}
 
 
 def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> dict[int, int]:
-    """Return the opportunities that the actions of the plan before are, by their number.
+    """Return the opportunity of each action of the previous plan, by the action's number.
 
-    What is no longer offered is left out.
+    Actions that are no longer offered are left out.
     """
     satellites = {satellite.id: i for i, satellite in enumerate(scenario.satellites)}
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
@@ -57,7 +57,7 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
         wanted, keys.searchsorted(asked).tolist(), keys.searchsorted(asked, "right").tolist(),
         strict=True,
     )  # fmt: skip
-    # The opportunities of one satellite and place stand in order of start.
+    # The opportunities of one satellite and site are in order of start.
     start_s = table.start_s[order].tolist()
     found: dict[int, int] = {}
     for i, low, high in spans:
@@ -72,12 +72,12 @@ def rows_of_base(scenario: Scenario, table: Opportunities, replan: Replan) -> di
 
 
 class Named(NamedTuple):
-    """Opportunities by the names that operators give them.
+    """Opportunities with what operators name them by.
 
     Attributes
     ----------
     origin
-        The number of each, where that is not its row.
+        The number of each, if that is not its row.
     """
 
     scenario: Scenario
@@ -86,10 +86,10 @@ class Named(NamedTuple):
 
 
 def rows_skipped(named: Named, pin: PinnedAction, pointer: str) -> list[int]:
-    """Return the opportunities that a skip means: of a span all that overlap it.
+    """Return the opportunities that a skip means: for a span, all that overlap it.
 
-    A span that is some opportunity's own, give or take a second, means that one alone; of a pass
-    it means every part.
+    A span that is an opportunity's own, to within a second, means that one alone; if that is part
+    of a pass, every part.
     """
     scenario, table = named.scenario, named.table
     nearest = row_of(named, pin, pointer)
@@ -110,7 +110,7 @@ def rows_skipped(named: Named, pin: PinnedAction, pointer: str) -> list[int]:
 
 
 def _named_by(named: Named, pin: PinnedAction) -> Bools:
-    """Return the opportunities that are of the satellite, target or station that a pin names."""
+    """Return the opportunities of the satellite, target or station that a pin names."""
     scenario, table = named.scenario, named.table
     fits = np.ones(len(table), dtype=np.bool_)
     if pin.satellite_id is not None:
@@ -129,7 +129,7 @@ def _named_by(named: Named, pin: PinnedAction) -> Bools:
 
 
 def row_of(named: Named, pin: PinnedAction, pointer: str) -> int:
-    """Return the opportunity that an operator's words mean."""
+    """Return the opportunity that a pin means."""
     scenario, table = named.scenario, named.table
     fits = _named_by(named, pin)
     like_it = np.flatnonzero(fits)
@@ -155,13 +155,13 @@ def row_of(named: Named, pin: PinnedAction, pointer: str) -> int:
 
 
 def _are_parts(table: Opportunities, rows: Longs) -> bool:
-    """Return whether these are parts of one and the same pass."""
+    """Return whether these are parts of the same pass."""
     is_contact = bool((table.kind[rows] == CONTACT).all())
     return is_contact and len(np.unique(table.access[rows])) == 1
 
 
 def _meant_by(table: Opportunities, row: int, pin: PinnedAction) -> list[int]:
-    """Return all rows that skipping one of them means: of a pass every part."""
+    """Return all rows that are skipped with one: for a contact, every part of its pass."""
     if table.kind[row] != CONTACT or pin.opportunity_id is not None:
         return [row]
     rows: list[int] = np.flatnonzero(table.access == table.access[row]).tolist()

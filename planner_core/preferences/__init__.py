@@ -1,1 +1,1 @@
-"""What operators like beside worth: secondary aims that never cost any."""
+"""What operators prefer besides worth: secondary aims that never cost any worth."""

@@ -1,4 +1,4 @@
-"""How near a plan comes to each secondary aim, and which images lead there."""
+"""How near a plan is to each secondary aim, and which images bring it nearer."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from planner_core.referee.view import View
 
 
 def value_of(view: View, aim: Preference) -> float:
-    """Return how far a plan is from an aim: less is better, and what the plan has none of is 0.
+    """Return how far a plan is from an aim: less is better; 0 if the plan has nothing to measure.
 
-    ``early`` counts an image that stays on board as old as the whole horizon.
+    For ``early``, the age of an image that stays on board is the whole horizon.
     """
     return _VALUES[aim](view)
 
@@ -70,7 +70,7 @@ _VALUES: Final[Mapping[Preference, Callable[[View], float]]] = {
 
 
 def figure_of(aim: Preference, value: float) -> float:
-    """Return such a value as people put it: of what should be high, the figure itself.
+    """Return such a value as people state it: for what should be high, the figure itself.
 
     >>> figure_of("margin", 0.25)
     0.75
@@ -80,9 +80,9 @@ def figure_of(aim: Preference, value: float) -> float:
 
 
 def liking_of(view: View, aim: Preference) -> Floats | None:
-    """Return how much better each collect is for an aim while contacts stay, from -1 to 0.
+    """Return how good each collect is for an aim if contacts stay, from -1 to 0 (best).
 
-    None where images make no difference to it. Shape ``(n,)``.
+    None if images make no difference to the aim. Shape ``(n,)``.
     """
     table = view.problem.opportunities
     if aim == "off_nadir":
@@ -99,7 +99,7 @@ def liking_of(view: View, aim: Preference) -> Floats | None:
 
 
 def _of_age(view: View) -> Floats:
-    """Return how long images wait for the next contact of the plan, as a share of the horizon."""
+    """Return minus the wait of images for the plan's next contact, as a share of the horizon."""
     table, horizon_s = view.problem.opportunities, view.problem.horizon_s
     liking = np.zeros(len(table))
     actions = view.plan.columns
@@ -114,7 +114,7 @@ def _of_age(view: View) -> Floats:
 
 
 def _of_drain(view: View) -> Floats:
-    """Return -1 for what lowers the battery before it is lowest, 0 for the rest."""
+    """Return -1 for tasks that drain the lowest battery since it was last full, 0 for others."""
     table = view.problem.opportunities
     liking = np.zeros(len(table))
     lines = view.curves

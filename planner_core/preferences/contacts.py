@@ -1,4 +1,4 @@
-"""Contacts that nothing needs, taken away."""
+"""Removal of contacts that a plan does not need."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from planner_core.referee.view import View
 
 
 def without_contacts(view: View, accepts: Accepts, budget: Budget) -> View:
-    """Return the plan without contacts that it can do without, the last ones first."""
+    """Return the plan without unnecessary contacts, tried from the last one backward."""
     kept = set(view.problem.kept_rows.tolist())
     for contact in reversed(view.contacts):
         if budget.is_spent():

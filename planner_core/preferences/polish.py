@@ -1,9 +1,9 @@
 """A plan of the same worth that comes nearer to what is preferred.
 
-The search for worth is over: what it found and has proven stays as it is, to the last bit. Aims are
-followed in their order, each by contacts that are added or dropped and by windows of images that
-are planned anew; the referee says of every step what it did to worth and aims. Aims further down
-may cost those before them a hundredth at most.
+The search for worth is over: its reward and bound stay the same, to the last bit. Aims are pursued
+in their order, each by adding or dropping contacts and by replanning windows of images; the referee
+judges the effect of every step on worth and aims. Later aims may make earlier ones worse by a
+hundredth at most.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ _LEAST_MOVES: Final = 64
 _MOST_ROUNDS: Final = 24
 _MOST_MISSES: Final = 6
 _GROWTH: Final = 3.0
-"""Of moves after a plan that is accepted; half of what is above 1 after each that is not. Less than
-a move on each satellite is one on some. Of 20 satellites over 2,000 cities images come to 22.9 deg
-off nadir by that aim alone, the busiest satellite to 0.195 of them by that; with a move on each at
-least to 27.3 deg and 0.208, which is where they were. As a second aim after `early`: 993 s and 25.9
-deg in 0.7 s, where growth stays at 3 956 s and 27.1 deg in 1.0 s."""
+"""Factor on the number of moves after each accepted plan; its excess over 1 is halved after each
+rejected one. Less than a move per satellite means a move on some. For 20 satellites over 2,000
+cities the off-nadir aim alone reached 22.9 deg, the balance aim a share of 0.195 for the busiest;
+with at least a move on each, 27.3 deg and 0.208, as before. With off-nadir second after `early`:
+993 s and 25.9 deg in 0.7 s; if growth stays at 3, 956 s and 27.1 deg in 1.0 s."""
 _MORE_CAUTION: Final = 4.0
-"""For aims before the one at hand, after each plan that cost them too much. The same images are 993
-s old and at 25.9 deg off nadir with it, 983 s and 27.6 deg without (27.3 before), and the busiest
-satellite takes 2.6 times the median's, 2.9 without."""
-_LEAST_GAIN: Final = 0.001  # of an aim, for another round
-_SLACK: Final = 0.01  # of an aim, for those after it
+"""Factor on the weight of earlier aims after each rejected plan. The same images reach 993 s and
+25.9 deg off nadir with it, 983 s and 27.6 deg without (27.3 before); the busiest satellite takes
+2.6 times the median's images, 2.9 without."""
+_LEAST_GAIN: Final = 0.001  # relative gain of an aim that justifies another round
+_SLACK: Final = 0.01  # relative loss of an aim that later ones may cause
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """The figure of an aim before and after: seconds, degrees, shares or a number."""
+    """The figure of an aim before and after: seconds, degrees, a share or a number."""
 
     aim: Preference
     before: float
@@ -53,7 +53,7 @@ class Effect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polished:
-    """The plan, and what it came to for each aim, in their order."""
+    """The plan, and its effect on each aim, in the order of the aims."""
 
     plan: Plan
     effects: tuple[Effect, ...]
@@ -62,7 +62,7 @@ class Polished:
 def polished(
     problem: Problem, plan: Plan, aims: tuple[Preference, ...], budget: Budget, seed: int
 ) -> Polished:
-    """Return the plan, nearer to the aims where that costs nothing."""
+    """Return a plan of the same worth that is as near or nearer to the aims."""
     view = View.of(problem, plan)
     before = {aim: figure_of(aim, value_of(view, aim)) for aim in aims}
     limits = dict[Preference, float]()
@@ -73,7 +73,7 @@ def polished(
             if aim in ("few_contacts", "margin"):
                 view = without_contacts(view, accepts, budget)
             if not problem.continuous_starts and not budget.is_spent():
-                # One search for all aims: to build it takes a while.
+                # All aims share one search, since building it takes a while.
                 windows = windows or ResourceWindows(problem, seed + number)
                 view = _with_windows(view, windows, aims[: number + 1], accepts, budget)
             if aim == "early" and problem.use_resources:
@@ -88,7 +88,7 @@ def polished(
 
 
 class _Acceptance:
-    """Says of plans whether they cost nothing and come nearer to the aim at hand."""
+    """Decides whether a plan costs nothing and comes nearer to the current aim."""
 
     def __init__(self, view: View, aim: Preference, limits: Mapping[Preference, float]) -> None:
         self._reward, self._aim, self._limits = view.timeline.reward, aim, limits
@@ -113,10 +113,10 @@ def _with_windows(
     accepts: Accepts,
     budget: Budget,
 ) -> View:
-    """Return the plan with windows of images that are planned anew, contacts as they are.
+    """Return the plan with windows of images replanned, contacts unchanged.
 
-    They come nearer to the last of the aims. Those before it count as well, the more the oftener a
-    plan had cost them too much.
+    They come nearer to the last of the aims. Earlier aims count as well, with a weight that rises
+    each time a plan is rejected.
     """
     problem, aim = view.problem, aims[-1]
     caution = 1.0
@@ -142,7 +142,7 @@ def _with_windows(
                 break
             num_moves = min(growth * num_moves, most_moves)
         else:
-            # Fewer moves at once are less likely to lose something between them.
+            # Fewer moves at once are less likely to lose something together.
             num_moves, num_misses = num_moves / _GROWTH, num_misses + 1
             growth = 1.0 + (growth - 1.0) / 2.0
             caution *= _MORE_CAUTION
@@ -150,7 +150,7 @@ def _with_windows(
 
 
 def _worth_in(view: View) -> Floats:
-    """Return what each image earns with the contacts of the plan, about."""
+    """Return roughly what each image earns with the contacts of the plan."""
     problem = view.problem
     if not problem.counts_delivery:
         return problem.worth

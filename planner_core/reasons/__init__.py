@@ -1,1 +1,1 @@
-"""Why a target is not in a plan, how certain that is, and what would let it in."""
+"""Why a target is not in a plan, how certain the reason is, and what change would let it in."""

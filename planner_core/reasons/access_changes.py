@@ -1,6 +1,6 @@
-"""What would give a target an opportunity that geometry denies it: the least change, tried.
+"""The smallest changes of settings that give an opportunity to a target that has none, by trial.
 
-Each limit is lifted alone; where that helps, its value is narrowed down by halving.
+Each limit is lifted alone; if that helps, its value is narrowed down by bisection.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _STEPS_A_DEG: Final = 10  # values are stated to a tenth of a degree
 _LATER: Final = timedelta(days=3)
 
 _LIMITS: Final = (
-    # The setting, and the value that lets everything through.
+    # Each setting, and the value at which it excludes nothing.
     ("off_nadir_max_deg", 90.0),
     ("off_nadir_min_deg", 0.0),
     ("min_elevation_deg", 0.0),
@@ -37,20 +37,20 @@ _OF_SENSORS: Final = frozenset({"sun_exclusion_deg"})
 _SWITCHES: Final = (("look_side", "any"), ("orbit_direction", "any"))
 
 OF_TARGETS: Final = frozenset({"collect_s", "release", "due", "sensor_type"})
-"""Settings that are the target's alone to change."""
+"""Settings that only the target has."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AccessChange:
-    """A setting with which the target has an opportunity; it has been computed.
+    """A value of a setting with which the target has an opportunity; computed, not estimated.
 
     Attributes
     ----------
     setting, value
-        A field of sensors and targets that both are set to where theirs is narrower, one of
-        ``OF_TARGETS`` of the target, or ``horizon_end``.
+        A field that is changed in every sensor and target whose own value is stricter, one of the
+        target's ``OF_TARGETS``, or ``horizon_end``.
     satellite
-        Which satellite could then image it.
+        The satellite that could then image it.
     """
 
     setting: str
@@ -59,14 +59,14 @@ class AccessChange:
 
 
 def access_changes(scenario: Scenario, target: int, budget: Budget) -> tuple[AccessChange, ...]:
-    """Return changes that give a target without opportunity one, each by itself enough.
+    """Return changes each of which alone gives an opportunity to a target that has none.
 
-    None where no single one does.
+    The result is empty if no single change does.
 
     Raises
     ------
     Cancelled
-        The budget was spent first.
+        The budget is spent before the search ends.
     """
     alone = replace(
         scenario,
@@ -113,7 +113,7 @@ def _found(
 
 
 def _with_target(alone: Scenario, name: str, value: object) -> Scenario:
-    """Return the scenario with another value of its one target."""
+    """Return the scenario with another value of a setting of its only target."""
     change: dict[str, Any] = {name: value}
     return replace(alone, targets=(replace(alone.targets[0], **change),))
 
@@ -121,7 +121,7 @@ def _with_target(alone: Scenario, name: str, value: object) -> Scenario:
 def _sooner_or_later(
     alone: Scenario, imaged_by: Callable[[Scenario], int | None], budget: Budget
 ) -> Iterator[AccessChange]:
-    """Return the latest release and the earliest due time with which an access has room."""
+    """Yield the latest release and the earliest due time with which an access has room."""
     for name in ("release", "due"):
         if getattr(alone.targets[0], name) is None:
             continue
@@ -130,7 +130,7 @@ def _sooner_or_later(
             continue
         starts_s, ends_s = table.start_s, table.end_s
         if alone.collect_alignment == "access":
-            # A collect need not stay where it is centred: it moves with the time that cuts it.
+            # Release and due times cut the access, and the collect is centred in what is left.
             length_s = ends_s - starts_s
             starts_s, ends_s = table.access_end_s - length_s, table.access_start_s + length_s
         whole_s = np.floor(starts_s.max()) if name == "release" else np.ceil(ends_s.min())
@@ -141,7 +141,7 @@ def _sooner_or_later(
 
 
 def _with_limit(scenario: Scenario, name: str, value: float) -> Scenario:
-    """Return the scenario with a limit loosened to ``value`` wherever it is narrower."""
+    """Return the scenario with a limit relaxed to ``value`` wherever it is stricter."""
     sign = -1.0 if "_max" in name else 1.0
     is_target_free = name in _OF_SENSORS
 
@@ -169,7 +169,7 @@ def _with(
 def _narrowed(
     alone: Scenario, name: str, open_value: float, imaged_by: Callable[[Scenario], int | None]
 ) -> float:
-    """Return the tightest value that still suffices, by halving."""
+    """Return the strictest value that still suffices, by bisection."""
     targets = () if name in _OF_SENSORS else alone.targets
     own = [getattr(x, name) for x in (*(s.sensor for s in alone.satellites), *targets)]
     sign = -1.0 if "_max" in name else 1.0
@@ -202,7 +202,7 @@ def _shorter(alone: Scenario, imaged_by: Callable[[Scenario], int | None]) -> Ac
 
 
 def _later(alone: Scenario, budget: Budget) -> AccessChange | None:
-    """Return the end of the horizon at which the first opportunity is over."""
+    """Return the end of the horizon with which the target gets its first opportunity."""
     horizon = replace(alone.horizon, end=alone.horizon.end + _LATER)
     try:
         table = compute_opportunities(replace(alone, horizon=horizon), budget).opportunities
@@ -211,7 +211,7 @@ def _later(alone: Scenario, budget: Budget) -> AccessChange | None:
     if len(table) == 0:
         return None
     first = int(np.argmin(table.access_end_s))
-    # The whole access must be in, or the collect would be centred elsewhere in what is left.
+    # The whole access must be in the horizon, or the collect would be centred in what is left.
     end = horizon.instant(float(np.ceil(table.access_end_s[first]) + 1.0))
     changed = replace(alone, horizon=replace(horizon, end=max(end, alone.horizon.end)))
     again = compute_opportunities(changed, budget).opportunities

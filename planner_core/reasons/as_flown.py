@@ -1,8 +1,8 @@
-"""A plan with starts of its own as one of a problem that offers just those starts.
+"""A plan with continuous starts, rewritten for a problem whose opportunities have these starts.
 
-What asks "does it fit beside the plan?" looks at opportunities. So each action with its own start
-becomes one, and so do the starts at which a target left out would fit first after each task
-of the plan: with continuous starts the scenario's opportunities alone would not be the truth.
+Code that tries whether an image fits beside the plan only looks at opportunities. With continuous
+starts those of the scenario do not suffice. So each action of the plan becomes an opportunity, and
+so does the earliest start of each target left out after each task of the plan.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from planner_core.sorting import first_not_below
 
 
 def as_flown(problem: Problem, plan: Plan, targets: Longs) -> tuple[Retimed, Plan]:
-    """Return the problem with the plan's own starts and those that suit ``targets``, and the plan.
+    """Return the problem with the plan's starts and those that suit ``targets``, and the plan.
 
     The plan's actions keep their positions.
     """
@@ -47,7 +47,7 @@ def as_flown(problem: Problem, plan: Plan, targets: Longs) -> tuple[Retimed, Pla
 
 
 def in_rows_of(source: Ints, reason: Reason) -> Reason:
-    """Return a reason that speaks of the opportunities which the starts were made from."""
+    """Return a reason in terms of the original opportunities, from which the starts were made."""
     change = reason.change
     if change is not None:
         change = replace(change, opportunity=int(source[change.opportunity]))
@@ -58,7 +58,7 @@ def in_rows_of(source: Ints, reason: Reason) -> Reason:
 
 
 def _fitting(problem: Problem, plan: Plan, index: int, targets: Longs) -> tuple[Ints, Floats]:
-    """Return the starts of the targets' accesses that come first after tasks of one satellite."""
+    """Return the earliest starts in the targets' accesses after each task of one satellite."""
     table, pointing = problem.opportunities, problem.pointing
     collects, offsets = problem.target_opportunities
     rows = np.concatenate(
@@ -99,7 +99,7 @@ def _first_starts(
     open_s: Floats,
     close_s: Floats,
 ) -> tuple[Ints, Floats]:
-    """Return, access by access, its first start after each task around it."""
+    """Return, for each access, its earliest start after each task around it."""
     access, found = [np.int32(0) for _ in range(0)], [0.0 for _ in range(0)]
     for c in range(len(target)):
         i = first_not_below(start_s, open_s[c])

@@ -1,4 +1,4 @@
-"""One target left out, gone through opportunity by opportunity with the referee itself."""
+"""Why one target is left out, in detail: each of its opportunities is tried with the referee."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from planner_core.referee.timeline import Timeline, Violation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """What the referee says of the plan with one more opportunity.
+    """The referee's verdict on the plan with one more opportunity.
 
     Attributes
     ----------
     opportunity
-        Row of the problem; None where pins have ruled it out.
+        Row of the problem; None if pins rule it out.
     scenario_row
         Row of the scenario's table.
     violations
-        What the plan then breaks and did not break before, with the positions in
-        ``plan.actions`` of the actions that break it. None needed where it fits.
+        New violations that it causes, with ``blamed`` as positions in ``plan.actions``. Empty if
+        it fits.
     displaces
-        Positions in ``plan.actions`` of the actions that have to go for it.
+        Positions in ``plan.actions`` of the actions that have to be dropped for it.
     is_settled
-        Whether the plan without those and with it is valid.
+        Whether the plan with it and without those is valid.
     reward_delta
-        What that plan earns more, where it is valid.
+        How much more that plan earns, if it is valid.
     ruled_out
         Whether a pin rules it out; ``displaces`` are then kept actions in its way.
     """
@@ -54,7 +54,7 @@ class Attempt:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """A target's outcome, and every opportunity that it had, in order of time."""
+    """A target's outcome, and an attempt with each of its opportunities, in order of time."""
 
     outcome: TargetOutcome
     attempts: tuple[Attempt, ...]
@@ -63,7 +63,7 @@ class Explanation:
 def explain_target(
     problem: Problem, plan: Plan, timeline: Timeline, target: int, search: Search = UNKNOWN_SEARCH
 ) -> Explanation:
-    """Return why one target is not in the plan, at length.
+    """Return why one target is not in the plan, in detail.
 
     A target that is collected has no attempts.
     """

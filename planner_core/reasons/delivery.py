@@ -1,7 +1,7 @@
-"""Reasons where it counts when images are on the ground: what a change of the plan really earns.
+"""Reasons if the time of delivery counts: what a change of the plan really earns.
 
-A further image delays all that its satellite records after it, and may keep it on board. So what
-that satellite does with it is given to the referee, for as many targets as takes a second or so.
+A further image delays all that its satellite records after it, and may keep some of it on board.
+So the referee replays that satellite's changed plan, for as many targets as about a second allows.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from planner_core.referee.replay import replay
 from planner_core.referee.timeline import Timeline
 
 _MOST_ACTIONS: Final = 10_000
-"""That the referee replays for the reasons of one plan, at 0.13 ms each: little over a second."""
+"""The most actions replayed for the reasons of one plan, at 0.13 ms each: just over a second."""
 _NOTHING: Final = 1e-9
 _SETTLED: Final = frozenset({"solver_limit", "displaced_by"})
 _UNSURE: Final = "When images come down then was not worked out."
@@ -27,17 +27,17 @@ _UNSURE: Final = "When images come down then was not worked out."
 def weighed_by_delivery(
     problem: Problem, plan: Plan, timeline: Timeline, reasons: Mapping[int, Reason]
 ) -> dict[int, Reason]:
-    """Return reasons that say what plans with these targets earn, by the referee.
+    """Return the reasons with what plans with these targets earn according to the referee.
 
     Parameters
     ----------
     reasons
-        By target, as if each image earned the most that it can.
+        By target, worked out as if each image earned the most that it can.
     """
     trials = _Trials(problem, plan, timeline)
     num_left = _MOST_ACTIONS
     if problem.pointing is not None:
-        num_left = 0  # the reasons speak of other starts than the problem's rows
+        num_left = 0  # the reasons are about other starts than those of the problem's rows
     told = dict(reasons)
     weighed = [target for target, reason in reasons.items() if _is_weighed(reason)]
     for target in sorted(weighed, key=lambda target: _promise(reasons[target]), reverse=True):
@@ -58,7 +58,7 @@ def _is_weighed(reason: Reason) -> bool:
 
 
 def _promise(reason: Reason) -> float:
-    """Return what the plan would earn at most, by the reason: what promises most is tried first."""
+    """Return the most that the plan could gain, by its reason; the largest gain is tried first."""
     return math.inf if reason.reward_delta is None else reason.reward_delta
 
 
@@ -70,10 +70,10 @@ class _Trial(NamedTuple):
 
 
 class _Trials:
-    """What to replay with one more image: its satellite's actions, where that settles it.
+    """The actions to replay with one more image: only those of its satellite, if that is enough.
 
-    It does not where the plan breaks limits or images a target twice: another satellite's image
-    may count then in place of one that goes.
+    It is not enough if the plan breaks limits or images a target twice: another satellite's image
+    may then count in place of one that is dropped.
     """
 
     def __init__(self, problem: Problem, plan: Plan, timeline: Timeline):
@@ -83,7 +83,7 @@ class _Trials:
         self._rewards: dict[int, float] = {}
 
     def with_image(self, opportunity: int, blocking: Collection[int]) -> _Trial:
-        """Return the actions with an image in place of those at these positions."""
+        """Return the actions with an image in place of those at the ``blocking`` positions."""
         satellite = int(self._satellite_of[opportunity])
         left = [
             action.opportunity

@@ -1,4 +1,4 @@
-"""What a forced opportunity displaces in all, so that battery and recorder last as well."""
+"""All that a forced opportunity displaces for battery and recorder to keep their limits too."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from planner_core.reasons.forcing import (
 
 AT_END: Final = -2
 _MAX_DROPS: Final = 4
-_LOOK_BACK: Final = 30  # collects that may make room
+_LOOK_BACK: Final = 30  # how many collects may be considered for dropping
 
 
 class Displaced(NamedTuple):
-    """What one opportunity displaces in all, so that it fits.
+    """All that each opportunity displaces so that it fits.
 
     Attributes
     ----------
     dropped
         Which tasks of the plan; shape ``(n, num_tasks)``.
     is_settled
-        Whether the rest then keeps the limits; nothing more may be dropped otherwise.
+        Whether the rest then keeps the limits; if not, only tasks in its way are dropped.
     broken, break_row
-        Which limit breaks first with only those in its way dropped, and at which task: a local
-        row, or ``AT_END``.
+        Which limit breaks first if only the tasks in its way are dropped, and at which task: a
+        local row, or ``AT_END``.
     """
 
     dropped: Bools
@@ -47,10 +47,10 @@ class Displaced(NamedTuple):
 
 
 def displace_each(planned: PlannedSatellite, candidates: Ints, forced: Forced) -> Displaced:
-    """Return what these opportunities displace, battery and recorder included.
+    """Return what these opportunities displace, with battery and recorder taken into account.
 
-    What is in the way goes first. Then collects that earn least and lie nearest ahead of the
-    break go, one by one, and those that turn out not to matter come back.
+    Tasks in the way are dropped first. Then the collects before the break that earn least (the
+    latest of equals) are dropped one by one, and those that prove unnecessary are restored.
     """
     n = len(candidates)
     displaced = Displaced(
@@ -127,9 +127,9 @@ def _first_break(
     begin: int,
     end: int,
 ) -> tuple[int, int]:
-    """Return the task at which a limit breaks and which; n for the end, n + 1 for ``row``.
+    """Return the task at which a limit breaks, and the limit; n for the end, n + 1 for ``row``.
 
-    -1 and ``FITS`` where none does. ``row`` stands before task ``at``; other changes lie
+    Returns -1 and ``FITS`` if none breaks. ``row`` comes before task ``at``; other changes lie
     between ``begin`` and ``end``.
     """
     n = len(plan.rows)
@@ -167,7 +167,7 @@ def _first_break(
 def _least(
     track: Track, plan: Sequence, dropped: Bools, c: int, row: int, at: int, until: int
 ) -> int:
-    """Return the collect up to ``until`` that earns least, the latest of those; -1 for none."""
+    """Return the collect up to ``until`` that earns least, the latest of equals; -1 for none."""
     found, num_seen = -1, 0
     i = until
     while i >= 0 and num_seen < _LOOK_BACK:
@@ -191,7 +191,7 @@ def _may_stand(
     i: int,
     is_taken: bool,
 ) -> bool:
-    """Return whether the tasks around task ``i`` follow each other, with or without it."""
+    """Return whether the tasks around task ``i`` may follow each other, with or without it."""
     before, after = i - 1, i + 1
     while before >= 0 and dropped[c, before]:
         before -= 1

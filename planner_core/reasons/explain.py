@@ -1,9 +1,9 @@
 """Why a target is not in a plan: first what geometry and pins prove, then what the plan blocks.
 
-For each target left out, each of its opportunities is forced into the final plan: what it
-displaces, which limit would break and when, and what that does to the reward. All targets are
-done at once, with the arithmetic of ``planner_core.mdp.track``; ``at_length`` goes through one
-target's opportunities with the referee itself.
+For each target left out, each of its opportunities is forced into the final plan, to find what it
+displaces, which limit would break and when, and how the reward changes. All targets are treated
+at once, with the arithmetic of ``planner_core.mdp.track``; ``at_length`` tries one target's
+opportunities with the referee itself.
 """
 
 from __future__ import annotations
@@ -66,14 +66,14 @@ _TOO_SOON: Final = (
     "Each of its opportunities begins before a satellite can have turned to it from where that "
     "looked at the start."
 )
-_ROUNDED: Final = 1e4  # fractions of capacity are stated to as many parts
-_SURE: Final = 2e-9  # of capacity: a stated limit is not touched
+_ROUNDED: Final = 1e4  # fractions of capacity are stated in steps of one in this many
+_SURE: Final = 2e-9  # of capacity: a margin so that a stated limit is not reached
 
 
 def explain(
     problem: Problem, plan: Plan, timeline: Timeline, search: Search = UNKNOWN_SEARCH
 ) -> tuple[TargetOutcome, ...]:
-    """Return every target exactly once, with its outcome and, if left out, a true reason."""
+    """Return each target's outcome, in order, with a true reason if it is left out."""
     before = {image.target: image for image in timeline.brought_down}
     reasons = _settled_reasons(problem, plan, timeline)
     left = [
@@ -186,7 +186,7 @@ def _broken(position: int, opportunity: int, code: str) -> Reason:
 
 
 def earned_by(problem: Problem, plan: Plan, timeline: Timeline) -> Floats:
-    """Return what the plan loses with each of its actions."""
+    """Return what the plan would lose without each of its actions."""
     table = problem.opportunities
     earned = np.zeros(len(plan.actions))
     images: dict[int, list[int]] = {}
@@ -202,7 +202,10 @@ def earned_by(problem: Problem, plan: Plan, timeline: Timeline) -> Floats:
 
 
 class _Tried(NamedTuple):
-    """All opportunities of the targets at hand, target after target; shape ``(n,)``."""
+    """All opportunities of the given targets, target after target; shape ``(n,)``.
+
+    Those of target ``i`` begin at ``first[i]``; shape ``(num_targets + 1,)``.
+    """
 
     rows: Ints
     first: Longs
@@ -260,9 +263,9 @@ def _try_all(problem: Problem, planned: list[PlannedSatellite], targets: Longs) 
 
 
 def _chosen(tried: _Tried, worth: Floats) -> Longs:
-    """Return for each target the opportunity that comes closest: the reason speaks of it.
+    """Return for each target the opportunity that comes closest to fitting, for its reason.
 
-    What fits comes first, then what only a limit keeps out, then what costs least reward.
+    One that fits comes first, then one that only a limit keeps out, then the least loss of reward.
     """
     forced = tried.forced
     is_free = forced.first == forced.last
@@ -272,7 +275,7 @@ def _chosen(tried: _Tried, worth: Floats) -> Longs:
 
 
 def _first_of_each(first: Longs, *keys: npt.NDArray[np.generic]) -> Longs:
-    """Return in each group what comes first by the last key, then the one before it."""
+    """Return the first of each group, sorted by the last key, then by the one before it."""
     group = np.repeat(np.arange(len(first) - 1), np.diff(first))
     return np.lexsort((*keys, group))[first[:-1]]
 
@@ -280,7 +283,7 @@ def _first_of_each(first: Longs, *keys: npt.NDArray[np.generic]) -> Longs:
 class _Changes(NamedTuple):
     """For each target the smallest change of settings that would let it in, if there is any.
 
-    ``size`` is relative, and infinite where there is none; shape ``(num_targets,)``.
+    ``size`` is relative, and infinite if there is none; shape ``(num_targets,)``.
     """
 
     rows: Ints
@@ -315,7 +318,7 @@ class _Changes(NamedTuple):
             ),
         }
         size = {name: np.abs(values[name] / np.maximum(now[name], 1e-9) - 1.0) for name in values}
-        # Either agility alone is changed, by the smaller of the two, or the limits together.
+        # Change the limits together, or the one setting of agility that changes less.
         is_settle = np.nan_to_num(size["settle_s"], nan=np.inf) < np.nan_to_num(
             size["slew_rate_deg_s"], nan=np.inf
         )

@@ -1,11 +1,10 @@
-"""What happens when an opportunity is forced into a plan: whom it displaces, which limits break.
+"""What happens if an opportunity is forced into a plan: what it displaces, which limits break.
 
-One satellite's plan is a row of tasks. An opportunity put into it displaces those next to it
-that the satellite cannot turn from or to in time. What that does to battery and recorder later
-on follows at once: from the level right after a task, the lowest battery of all that comes (after
-each task, less what idle time may draw from there on) is ``min(cap, level + drop)`` and the fullest
-recorder ``max(floor, level + rise)``, with constants
-worked out once, backward.
+One satellite's plan is a sequence of tasks. An opportunity put into it displaces those next to it
+from or to which the satellite cannot turn in time. Its effect on later battery and recorder takes
+no replay: given the level right after a task, the lowest battery from then on (after each task,
+less what idle time may draw after it) is ``min(cap, level + drop)`` and the fullest recorder is
+``max(floor, level + rise)``, with constants computed once, backward.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ from planner_core.problem.slew import (
 FITS: Final = 0
 BATTERY: Final = 1
 RECORDER: Final = 2
-_MOST_RATE: Final = 5.0  # times the satellite's own: nobody changes more than that
+_MOST_RATE: Final = 5.0  # times the satellite's own: greater changes are not worth proposing
 _NEVER: Final = 1e9
 
 
@@ -52,13 +51,13 @@ class Sequence(NamedTuple):
     rows
         Local rows in order.
     earned
-        What the plan loses with each task.
+        What the plan would lose without each task.
     is_fixed
-        Tasks that must stay.
+        Which tasks must stay.
     battery, recorder
-        After 0, 1, ... tasks. Shape ``(n + 1,)``.
+        Levels after 0, 1, ... tasks. Shape ``(n + 1,)``.
     cap, drop, floor, rise
-        What each task leaves for the rest; see the module.
+        Constants for the levels after each task; see the module.
     """
 
     rows: Ints
@@ -79,9 +78,9 @@ class PlannedSatellite:
     Attributes
     ----------
     positions
-        Of its actions in ``plan.actions``.
+        Positions of its actions in ``plan.actions``.
     is_sound
-        Whether the plan as it is keeps its limits.
+        Whether the unchanged plan keeps the limits.
     """
 
     index: int
@@ -130,7 +129,7 @@ class PlannedSatellite:
 
 @kernel
 def _fill(resources: ResourceColumns, plan: Sequence) -> bool:
-    """Fill in the levels of the plan as it is; return whether they keep the limits."""
+    """Fill in the levels of the unchanged plan; return whether they keep the limits."""
     n = len(plan.rows)
     plan.battery[0], plan.recorder[0] = resources.battery_start, resources.recorder_start
     last, is_sound = NO_TASK, True
@@ -167,21 +166,21 @@ def _fill(resources: ResourceColumns, plan: Sequence) -> bool:
 
 
 class Forced(NamedTuple):
-    """What forcing each of some opportunities does; shape ``(n,)``.
+    """The effect of forcing each of some opportunities into the plan; shape ``(n,)``.
 
     Attributes
     ----------
     first, last
-        Tasks ``first`` up to ``last`` of the plan are in its way: it cannot follow them or they
+        Tasks ``first`` to ``last - 1`` of the plan are in its way: they cannot precede or follow
         it.
     broken
-        ``FITS``, ``BATTERY`` or ``RECORDER``, where those are dropped.
+        ``FITS``, ``BATTERY`` or ``RECORDER``, once those tasks are dropped.
     loss
-        What they earn; infinite where one must stay.
+        What those tasks earn; infinite if one must stay.
     rate_deg_s, settle_s
-        Agility with which nothing is in its way, where the limits allow that; NaN for none.
+        Agility with which nothing is in its way, if the limits allow that; NaN for none.
     lowest, highest
-        Battery and recorder limits that would just be touched.
+        Lowest battery and fullest recorder then: limits that would just be reached.
     """
 
     first: Ints
@@ -251,7 +250,7 @@ def _force_each(
                 forced.broken[c] = BATTERY
             elif highest >= resources.recorder_max - STRICT:
                 forced.broken[c] = RECORDER
-        # What a faster turn from and to moving lines of sight would need is not said.
+        # For turns in motion, the agility that would suffice is not worked out.
         if first == last or len(track.transitions.moves) > 0:
             continue
         if track.use_resources:
@@ -286,7 +285,7 @@ def _levels(
 ) -> tuple[float, float]:
     """Return the lowest battery and the fullest recorder from ``row`` on.
 
-    It stands in the plan in place of the tasks ``first`` up to ``last``.
+    ``row`` takes the place of tasks ``first`` to ``last - 1`` of the plan.
     """
     before = plan.rows[first - 1] if first > 0 else NO_TASK
     battery, recorder = plan.battery[first], plan.recorder[first]
@@ -326,7 +325,7 @@ def _angle_deg(los_end: Floats, a: int, los_start: Floats, b: int) -> float:
 
 @inner
 def _rate_for(angle_deg: float, available_s: float, acceleration_deg_s2: float) -> float:
-    """Return a rate, in whole thousandths, that turns through an angle in time."""
+    """Return a slew rate, in whole thousandths, that turns through an angle in time."""
     if available_s <= 0.0:
         return _NEVER
     rate: float = angle_deg / available_s
@@ -342,5 +341,5 @@ def _rate_for(angle_deg: float, available_s: float, acceleration_deg_s2: float) 
 
 @inlined
 def follows(track: Track, a: int, b: int) -> bool:
-    """Return whether a task may follow another directly, or stand first."""
+    """Return whether task ``b`` may directly follow ``a``, or come first."""
     return may_follow(track.transitions, a, b)

@@ -1,4 +1,4 @@
-"""What may be said of a target: its outcome, and the reason where it is left out."""
+"""The outcome of a target, and the reason if it is left out."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Change:
     Attributes
     ----------
     opportunity
-        What could then be taken.
+        The opportunity that could then be taken.
     satellite, settings
         Settings of that satellite (``slew_rate_deg_s``, ``settle_s``,
         ``battery_min_fraction``, ``recorder_max_fraction``) and values that just suffice.
-        None and none where actions have to be dropped.
+        None and empty if actions have to be dropped instead.
     drop
-        Positions in ``plan.actions`` of the actions that have to go.
+        Positions in ``plan.actions`` of the actions that have to be dropped.
     """
 
     opportunity: int
@@ -45,13 +45,13 @@ class Reason:
     blocking
         Positions in ``plan.actions`` of the actions in its way.
     opportunity
-        The opportunity that the reason speaks of, where it is one.
+        The opportunity that the reason is about, if it is about one.
     at_s
-        When the limit would break, where one would.
+        When a limit would break, if one would.
     reward_delta
-        What the plan would earn more with it and without the blocking actions.
+        How much more the plan would earn with the target and without the blocking actions.
     change
-        The smallest change that lets it in, among those tried.
+        The smallest change that lets the target in, among those tried.
     """
 
     code: ReasonCode
@@ -77,16 +77,16 @@ class TargetOutcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """What is known of the search that made a plan.
+    """What is known about the search that made a plan.
 
     Attributes
     ----------
     is_optimal
-        Whether no plan earns more.
+        Whether it is proven that no plan earns more.
     breadth
-        How many tasks it looked at in each state at most; None for all.
+        The most tasks that it considered in each state; None for all.
     contact_above
-        How full the recorder was before contacts were among them.
+        How full the recorder had to be for contacts to be considered.
     """
 
     is_optimal: bool = False

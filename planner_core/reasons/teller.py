@@ -1,4 +1,4 @@
-"""What was tried on one satellite, put into words."""
+"""Reasons for targets left out, from trials on one satellite."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LIMITS: Final[dict[int, Literal["battery", "recorder"]]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=False, eq=False)
 class Teller:
-    """Puts what was tried on one satellite into words."""
+    """States as reasons what trials on one satellite have shown."""
 
     problem: Problem
     planned: PlannedSatellite
@@ -41,7 +41,7 @@ class Teller:
     search: Search
 
     def reason(self, c: int, target: int, opportunity: int, change: Change | None) -> Reason:
-        """Return the reason of the target whose opportunity stands at ``c``."""
+        """Return the reason for the target whose opportunity is candidate ``c``."""
         sequence = self.planned.sequence
         dropped = np.flatnonzero(self.displaced.dropped[c])
         blocking = tuple(sorted(self.planned.positions[dropped].tolist()))
@@ -83,7 +83,7 @@ class Teller:
         )
 
     def _is_looked_at(self, c: int, opportunity: int, breadth: int) -> bool:
-        """Return whether it is in A(s) after the action of the plan that it would follow."""
+        """Return whether the search considered it, in A(s) after the action it would follow."""
         plan, k = self.planned.sequence, int(self.forced.first[c])
         model = Model(
             track=self.planned.track,

@@ -1,4 +1,4 @@
-"""The same question with one change: targets or contacts forced or forbidden, limits relaxed."""
+"""A scenario with one change: targets or contacts forced or forbidden, limits relaxed."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Relaxation:
     Attributes
     ----------
     satellites
-        By satellite id: fields of its agility, its sensor and its resources.
+        By satellite id, fields of its agility, its sensor and its resources.
     targets
-        By target id: fields of the target.
+        By target id, fields of the target.
     horizon_end
-        When planning ends instead.
+        The new end of the horizon.
     """
 
     satellites: Mapping[str, Settings] = field(default_factory=dict)
@@ -47,13 +47,12 @@ class Relaxation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """What is to be different.
+    """The changes to a scenario.
 
     Attributes
     ----------
     force, forbid
-        Actions that the plan must hold, or may not. A target without a time means any image of
-        it.
+        Actions that the plan must, or must not, hold. A target without a time means any image.
     """
 
     force: tuple[PinnedAction, ...] = ()
@@ -67,7 +66,7 @@ def relaxed(scenario: Scenario, relax: Relaxation) -> Scenario:
     Raises
     ------
     InvalidScenario
-        Nothing of that name, or a value out of range; with a pointer into ``/relax``.
+        A name is unknown, or a value is out of range; with a pointer into ``/relax``.
     """
     satellites = {satellite.id: satellite for satellite in scenario.satellites}
     targets = {target.id: target for target in scenario.targets}
@@ -124,22 +123,22 @@ def _check_names(settings: Settings, known: set[str], pointer: str) -> None:
 
 
 def what_if(scenario: Scenario, change: Change, problem: Problem, plan: Plan) -> Scenario:
-    """Return the scenario with a change: pins more, or settings other than before.
+    """Return the scenario with a change: further pins, or other settings.
 
-    A target is forced by pinning one image of it: the one that the plan holds already or else,
-    by trial, the one whose forcing into the plan costs least reward. The best plan with another
-    image of it may earn more; whoever wants that one names its time.
+    A target is forced by pinning one image of it: the one that the plan already holds or else,
+    by trial, the one that costs least reward when forced into the plan. The best plan with
+    another image may earn more; to force that image, name its time.
 
     Parameters
     ----------
     problem, plan
-        What ``relaxed(scenario, change.relax)`` was compiled to, and a plan of it. Where
-        nothing is relaxed that is the plan at hand.
+        The problem compiled from ``relaxed(scenario, change.relax)``, and a plan of it. If
+        nothing is relaxed, that is the current plan.
 
     Raises
     ------
     InvalidScenario
-        With a pointer into the change.
+        The change is invalid; with a pointer into it.
     """
     changed = relaxed(scenario, change.relax)
     pins = scenario.pins
@@ -159,14 +158,14 @@ def what_if(scenario: Scenario, change: Change, problem: Problem, plan: Plan) ->
 
 
 def is_any_image(action: PinnedAction) -> bool:
-    """Return whether a target is meant as a whole, at whatever time."""
+    """Return whether any image of a target is meant, at whatever time."""
     return action.target_id is not None and action.start is None and action.opportunity_id is None
 
 
 def _with_time(
     scenario: Scenario, problem: Problem, plan: Plan, action: PinnedAction, pointer: str
 ) -> PinnedAction:
-    """Return the action with a time, where it is any image of a target."""
+    """Return the action, with a time if it means any image of a target."""
     if not is_any_image(action):
         return action
     if action.target_id not in problem.target_ids:
@@ -191,7 +190,7 @@ def _with_time(
 
 
 def _cheapest(problem: Problem, plan: Plan, action: PinnedAction) -> int | None:
-    """Return the image of a target that costs the plan least reward, the earliest of those."""
+    """Return the image of a target that costs the plan least reward, the earliest of equals."""
     target = problem.target_ids.index(str(action.target_id))
     timeline = replay(problem, plan, in_detail=False)
     held = timeline.collected.get(target)

@@ -1,1 +1,1 @@
-"""A plan that follows another one: what is flown stays, and as little else changes as must."""
+"""Replanning: what is flown stays as it was, and the rest changes as little as possible."""

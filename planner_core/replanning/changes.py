@@ -1,4 +1,4 @@
-"""What a replan has changed, and why: from the two plans alone."""
+"""What a replan has changed, and why, worked out from the two plans alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Changed:
     Attributes
     ----------
     because_of
-        Actions of the new plan that took its time.
+        Actions of the new plan that took its time or its station.
     """
 
     before: PlannedAction | None
@@ -34,15 +34,15 @@ def changes_of(
     is_lost: Callable[[PlannedAction], bool],
     turn_s: Mapping[str, float],
 ) -> tuple[Changed, ...]:
-    """Return what tells one plan from the other, in order of time.
+    """Return the differences between two plans, in order of time.
 
     Parameters
     ----------
     is_lost
         Whether an action could not have stayed, whatever is planned.
     turn_s
-        By satellite: the longest turn between two of its tasks. What is further apart does not
-        take each other's time.
+        By satellite, the longest turn between two of its tasks. Actions further apart do not
+        compete for time.
     """
     diff = plan_diff(
         PlanView(actions=tuple(before), totals={}), PlanView(actions=tuple(after), totals={})
@@ -80,7 +80,7 @@ def _gone(
 
 
 def _crowds(was: PlannedAction, other: PlannedAction, turn_s: Mapping[str, float]) -> bool:
-    """Return whether another action leaves no time for one, or takes its station."""
+    """Return whether ``other`` may leave no time for an action, or takes its station."""
     if other.satellite_id == was.satellite_id:
         around = timedelta(seconds=turn_s.get(was.satellite_id, 0.0))
         return other.start < was.end + around and other.end > was.start - around
@@ -89,7 +89,7 @@ def _crowds(was: PlannedAction, other: PlannedAction, turn_s: Mapping[str, float
 
 
 def share_of(found: Collection[Changed], num_before: int, *, forced: bool = False) -> float:
-    """Return which share of the plan before is moved or removed, or lost whatever is planned."""
+    """Return the share of the previous plan that is moved or removed (if ``forced``, only lost)."""
     counted = [
         one for one in found if one.before is not None and (one.cause == "lost" or not forced)
     ]

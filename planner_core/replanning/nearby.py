@@ -1,8 +1,8 @@
-"""The part of a replan that what happened can touch.
+"""The part of a replan that the news can touch.
 
-One request among ten thousand targets concerns a few passes. What is far from them stays as it is,
-though moves there might gain something too: nobody has asked for these changes. What is near is a
-question of its own, and its answer takes the place of what the plan had there.
+One request among ten thousand targets concerns a few passes. Actions far from them stay as they
+are: moves there might gain something, but nobody has asked for such changes. The part near them
+is solved as a question of its own, and its answer replaces that part of the plan.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from planner_core.problem.restrict import restricted
 from planner_core.replanning.question import News, Question
 
 _NEAR_S: Final = 120.0
-"""Of 16 urgent requests at 24 x 10,000: within 60 s 8.6 of 10 gained for 3 changes at most, within
-120 s 8.9 for 3, within 180 s 9.4 for 8, which are 0.2 % of the plan, in twice the time."""
-_MOST: Final = 0.5  # of all rows: a larger part is no part
+"""For 16 urgent requests at 24 x 10,000: within 60 s, 8.6 of 10 was gained for at most 3 changes;
+within 120 s 8.9 for 3; within 180 s 9.4 for 8 (0.2 % of the plan), in twice the time."""
+_MOST: Final = 0.5  # of all rows: a larger part is not worth solving separately
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Nearby:
-    """The question of a part.
+    """The question for a part of the problem.
 
     Attributes
     ----------
     rows
-        Of the whole problem, for each row of the part.
+        For each row of the part, its row in the whole problem.
     asked
         How many opportunities new and lost targets have.
     """
@@ -41,12 +41,12 @@ class Nearby:
     asked: int
 
     def of(self, plan: Plan) -> Plan:
-        """Return what a plan of the whole has in the part, in its rows."""
+        """Return the actions that a plan of the whole has in the part, in rows of the part."""
         taken = [action.opportunity for action in plan.actions]
         return Plan.of(self.question.problem, np.flatnonzero(np.isin(self.rows, taken)).tolist())
 
     def put_into(self, plan: Plan, found: Plan) -> Plan:
-        """Return a plan of the whole with what was found in the place of its part."""
+        """Return a plan of the whole with its actions in the part replaced by ``found``."""
         part = set(self.rows.tolist())
         others = [action for action in plan.actions if action.opportunity not in part]
         own = (
@@ -57,12 +57,12 @@ class Nearby:
 
 
 def nearby(question: Question, plan: Plan) -> Nearby | None:
-    """Return the part of a question that its news can touch, where the plan is as it is.
+    """Return the part of a question that its news can touch, given the plan.
 
-    It holds all opportunities near in time to those of new and of lost targets, and to what was
-    lost, but of targets that stay imaged elsewhere; what else there is for those that the plan
-    images there; and of the plan all that cannot stand beside one of these. None where that is most
-    of the question, or where battery and recorder tie it to all that follows.
+    It holds the opportunities near in time to those of new and lost targets and to lost actions,
+    all other opportunities of the targets imaged there, and the plan's actions that may conflict
+    with any of these; but no others of targets that stay imaged elsewhere. None if news is unknown,
+    the part is most of the question, or resources or deadlines couple it to all that follows.
     """
     problem, news = question.problem, question.news
     if news is None or problem.use_resources or question.deadline_s:
@@ -82,7 +82,7 @@ def nearby(question: Question, plan: Plan) -> Nearby | None:
         own = satellite.rows
         begin, end = near_in_time(satellite, np.flatnonzero(is_offered[own]))
         is_part[own] |= _within(len(own), begin, end) & is_taken[own]
-    # What stays imaged elsewhere needs no other image.
+    # A target that stays imaged elsewhere needs no other image.
     outside = np.unique(table.site[is_taken & is_image & ~is_part])
     is_part &= is_taken | ~(is_image & np.isin(table.site, outside))
     if is_part.sum() > _MOST * len(table):
@@ -107,7 +107,7 @@ def nearby(question: Question, plan: Plan) -> Nearby | None:
 
 
 def _near(question: Question, news: News, is_asked: Bools) -> Bools:
-    """Return the opportunities near in time to what is asked for and what is lost."""
+    """Return which opportunities are near in time to requested ones and to lost actions."""
     is_near = np.zeros(len(is_asked), dtype=np.bool_)
     for index, satellite in enumerate(question.problem.satellites):
         own = satellite.rows
@@ -128,7 +128,7 @@ def _near_instants(satellite: SatelliteProblem, at_s: np.ndarray) -> Bools:
 
 
 def _within(number: int, begin: Longs, end: Longs) -> Bools:
-    """Return which of so many rows lie in one of these spans."""
+    """Return which of ``number`` rows lie in one of these spans."""
     steps = np.zeros(number + 1, dtype=np.int64)
     np.add.at(steps, begin, 1)
     np.add.at(steps, end, -1)

@@ -1,4 +1,4 @@
-"""What the search for an earlier plan has worked out, for the plan that follows it."""
+"""What the search for the previous plan has found out, for the plan that follows it."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from planner_core.replanning.known import KnownMultipliers, multipliers_of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanBefore:
-    """A scenario before, and what was found out about it.
+    """The previous plan's scenario, and what was found out about it.
 
     Attributes
     ----------
     bound
-        What it has proven, if anything.
+        The bound proven for it, if any.
     imaged
-        The targets that it images; None where that is not known.
+        The targets that the plan images; None if unknown.
     """
 
     scenario: Scenario
@@ -31,17 +31,17 @@ class PlanBefore:
 
     @property
     def multipliers(self) -> KnownMultipliers | None:
-        """The multipliers of its targets, where it has any."""
+        """The multipliers of its targets, if it has any."""
         return multipliers_of(self.bound, [target.id for target in self.scenario.targets])
 
     def opportunities_of(self, scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
-        """Return those of the scenario that follows, of which only what is new is looked for."""
+        """Return the opportunities of the next scenario; only those of new targets are computed."""
         return opportunities_after(scenario, self.scenario, self.opportunities, budget)
 
     def asked_by(self, scenario: Scenario) -> frozenset[str] | None:
-        """Return the targets that are new in a replan, earn otherwise or have lost their image.
+        """Return the targets that are new in a replan, have changed or have lost their image.
 
-        None where more than that, what is out and what is pinned tells it from the plan before.
+        None if it differs from the previous plan in more than these, outages and pins.
         """
         replan, before = scenario.replan, self.scenario
         if replan is None or self.imaged is None or not is_seen_alike(scenario, before):

@@ -1,8 +1,8 @@
-"""Small programs for HiGHS over the tasks of a few plans: exact where windows cannot see far.
+"""Small integer programs for HiGHS over the tasks of a few plans: exact over the whole horizon.
 
-A contact that is lost fills a recorder hours before anything breaks, and what a window takes out
-there another one would have to put in. Over the tasks of one or two plans there are so few choices
-that the best mix is found at once.
+The recorder fills after a lost contact, and a limit breaks hours later: what one window of the
+neighbourhood search drops, another one would have to add. The tasks of one or two plans leave so
+few choices that the best mix is found at once.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from planner_core.replanning.question import Question
 from planner_core.solvers.milp import Milp
 from planner_core.solvers.sequential import blocked_rows
 
-_MOST_PAIRS: Final = 200_000  # of tasks near each other: beyond that programs take seconds
-_WORTH_BESIDE: Final = 1e-3  # of a kept image: of plans that keep as much the one that earns more
+_MOST_PAIRS: Final = 200_000  # of tasks near each other; with more, programs take seconds
+_WORTH_BESIDE: Final = 1e-3  # of a kept image: worth only breaks ties between equally many kept
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +35,7 @@ class Fewest:
     Attributes
     ----------
     num_kept
-        How many images of the base it keeps, and no valid plan keeps more of them where
-        ``is_proven``.
+        How many images of the base it keeps. If ``is_proven``, no valid plan keeps more.
     """
 
     plan: Plan
@@ -50,17 +49,17 @@ def fewest_changes(
     budget: Budget,
     most_pairs: float = _MOST_PAIRS,
 ) -> Fewest | None:
-    """Return the plan that keeps most images of the base, contacts being free.
+    """Return the plan that keeps most images of the base, with a free choice of contacts.
 
-    Nothing but the base and contacts can help to keep the base: images in their place are left to
-    others. Where turns by way of another task are quicker than direct ones this is no proof.
+    Only the base and contacts can help to keep the base; other searches fill the gaps with other
+    images. It is no proof if turns by way of another task can be quicker than direct ones.
 
     Parameters
     ----------
     satellites
-        Those whose part of the base may change; what the others do is left alone.
+        Those whose part of the base may change; the actions of the others stay fixed.
     most_pairs
-        Of tasks near each other: for a program that is larger the answer is None.
+        The most pairs of tasks near each other; with more, the function returns None.
     """
     problem = question.problem
     table = problem.opportunities
@@ -90,7 +89,7 @@ def fewest_changes(
 
 
 def _counting(question: Question, is_base: Bools) -> Problem:
-    """Return the problem in which images of the base count one each, and others next to nothing."""
+    """Return the problem in which images of the base count one each, and promised ones far more."""
     problem = question.problem
     is_image = problem.opportunities.kind != CONTACT
     worth = np.where(is_base & is_image, 1.0, 0.0)
@@ -101,7 +100,7 @@ def _counting(question: Question, is_base: Bools) -> Problem:
 
 
 def mixed(question: Question, plans: Sequence[Plan], budget: Budget, seed: int) -> Plan | None:
-    """Return the best mix of the base and some plans, changes counted; None where none is found.
+    """Return the best mix of the base and some plans, kept actions counted; None if none is found.
 
     Its contacts are those of the last plan: with these fixed the relaxation is nearly tight.
     """

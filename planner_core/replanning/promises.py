@@ -1,4 +1,4 @@
-"""Targets that somebody was promised: room is made for their images, or it is said why not."""
+"""Promised targets: make room for their images, or raise an error that says why not."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from planner_core.replanning.undo import value
 
 
 def with_promised(question: Question, plan: Plan) -> Plan:
-    """Return the plan with an image of each promised target, where one can be made room for."""
+    """Return the plan with an image of each promised target for which there can be room."""
     problem = question.problem
     kept = set(problem.kept_rows.tolist())
     protected = set(np.flatnonzero(question.is_promised).tolist())
@@ -38,9 +38,9 @@ def with_promised(question: Question, plan: Plan) -> Plan:
 
 
 def _with_downlink(question: Question, plan: Plan, target: int) -> Plan:
-    """Return the plan with a contact by which an image of a target is down in time, if any.
+    """Return the plan with a contact that delivers an image of a target in time, if any does.
 
-    With another image of it where the one at hand is too late.
+    If the current image is too late for that, another one replaces it.
     """
     problem = question.problem
     table, kept = problem.opportunities, set(problem.kept_rows.tolist())
@@ -72,7 +72,7 @@ def _with_downlink(question: Question, plan: Plan, target: int) -> Plan:
 
 
 def require_promises(question: Question, plan: Plan) -> None:
-    """Raise ``promise_not_kept`` where a plan misses something promised."""
+    """Raise ``promise_not_kept`` if a plan misses a promise."""
     problem, missing = question.problem, question.missing(plan)
     for i, target in enumerate(question.promised):
         if target not in missing:

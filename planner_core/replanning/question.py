@@ -1,4 +1,4 @@
-"""A replan in terms of its problem: the rows of the base, and what they count in the search."""
+"""A replan in terms of its problem: the rows of the base, and how they count in the search."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ class Lost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class News:
-    """What tells a replan's problem from that of the plan before.
+    """How a replan's problem differs from that of the previous plan.
 
     Attributes
     ----------
     targets
-        Those that are new, that earn otherwise, or that have lost an image.
+        Targets that are new, have changed or have lost their image.
     """
 
     targets: frozenset[int]
@@ -55,14 +55,14 @@ class News:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Question:
-    """What a search for a replan is given.
+    """The input of a search for a replan.
 
     Attributes
     ----------
     base
-        Rows of the plan before that are still offered, ascending. Shape ``(k,)``.
+        Rows of the previous plan that are still offered, ascending. Shape ``(k,)``.
     num_base
-        How many actions it had after the freeze, those that are lost included.
+        How many actions that plan had after the freeze, including lost ones.
     promised
         Targets that must be imaged, in the order of the promises.
     deadline_s
@@ -70,10 +70,10 @@ class Question:
     on_board
         Images from before the horizon, which the problem itself leaves out.
     news
-        What has happened, where that is all that tells the problem from the one before; None
-        where that is not known.
+        What has happened, if the problem differs from the previous one in nothing else; None if
+        unknown.
     typical_worth
-        Of an image, by which kept actions count; the problem's own where it is None.
+        Worth of an image in which kept actions are counted; None for the problem's own.
     """
 
     problem: Problem
@@ -93,7 +93,7 @@ class Question:
 
     @cached_property
     def bonus(self) -> Floats:
-        """What keeping each row counts in the search, beside its worth. Shape ``(n,)``."""
+        """What keeping each row adds to its worth in the search. Shape ``(n,)``."""
         kind = self.problem.opportunities.kind[self.base]
         shares = np.where(kind == COLLECT, self.stability.weight, self.stability.contact_weight)
         bonus = np.zeros(len(self.problem.opportunities))
@@ -109,9 +109,9 @@ class Question:
 
     @cached_property
     def searched(self) -> Problem:
-        """The problem whose images are worth what they count in the search.
+        """The problem with worths as the search counts them, with kept actions and promises.
 
-        A promised target is worth more than all that is not.
+        A promised target is worth more than all others together.
         """
         dear = 1.0 + float(self.problem.best_worth.sum()) + float(self.bonus.sum())
         table = self.problem.opportunities
@@ -128,7 +128,7 @@ class Question:
         return {}
 
     def judged(self, plan: Plan) -> Timeline:
-        """Return the referee's verdict; of the last plans asked about it is kept."""
+        """Return the referee's verdict; those on the most recent plans are remembered."""
         verdicts = self._verdicts
         found = verdicts.pop(plan, None) or replay(self.problem, plan, in_detail=False)
         verdicts[plan] = found
@@ -137,11 +137,11 @@ class Question:
         return found
 
     def may_fly(self, plan: Plan) -> bool:
-        """Return whether a plan breaks nothing but what no plan could help."""
+        """Return whether a plan breaks nothing that another plan could avoid."""
         return self.judged(plan).validity != "violations"
 
     def stable_worth(self, plan: Plan) -> float:
-        """Return what the kept actions of a plan count."""
+        """Return the total bonus of the kept actions of a plan."""
         return float(self.bonus[[action.opportunity for action in plan.actions]].sum())
 
     def changed(self, plan: Plan) -> int:
@@ -156,7 +156,7 @@ class Question:
         return self.num_base - kept
 
     def missing(self, plan: Plan) -> frozenset[int]:
-        """Return the promised targets that a plan does not image, or brings down too late."""
+        """Return the promised targets that a plan does not image, or downlinks too late."""
         table = self.problem.opportunities
         imaged = {
             int(table.site[action.opportunity])
@@ -176,7 +176,7 @@ class Question:
         return missing | late
 
     def down_s(self, plan: Plan) -> dict[int, float]:
-        """Return when the first image of each target is on the ground, of those that are."""
+        """Return when the first image of each target is on the ground, for targets with one."""
         timeline = replay(replace(self.problem, on_board=self.on_board), plan, in_detail=False)
         found = {
             target: image.delivered_s
@@ -199,8 +199,8 @@ def question_of(
     Parameters
     ----------
     asked
-        Targets that are new, or worth otherwise, or open again, where nothing else than that and
-        what is out or pinned tells the scenario from that of the plan before; None where it does.
+        Targets that are new, have changed or have lost their image, if the scenario differs from
+        the previous plan's only in these, outages and pins; otherwise None.
     """
     replan = scenario.replan
     assert replan is not None

@@ -1,9 +1,9 @@
 """Problems that begin beyond a limit, or whose frozen part leads there: contacts are the way back.
 
-Searches and bounds know limits as limits. They are given the same problem with satellites that
-begin with an emptier recorder and a fuller battery, so that what is frozen, and telemetry, keep the
-limits: whatever may be flown from the worse start may be flown from the better one, so that what is
-proven holds. The plan is then made one that may be flown.
+Searches and bounds treat limits as strict. So they get the same problem with satellites that begin
+with an emptier recorder and a fuller battery, such that frozen actions and telemetry keep the
+limits. Any plan that may be flown from the worse start may be flown from the better one, so bounds
+still hold. Afterwards the plan found is repaired for the real start.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _CLEARLY: Final = 1e-6  # of a capacity: farther from the limit than searches ke
 
 
 def within_limits(problem: Problem) -> Problem:
-    """Return the problem with satellites for which some plan keeps battery and recorder within.
+    """Return the problem with satellites for which some plan keeps the limits.
 
-    The problem itself where that is so already.
+    Returns the problem itself if that is so already.
     """
     if not problem.use_resources:
         return problem
@@ -48,10 +48,10 @@ def within_limits(problem: Problem) -> Problem:
 def flyable(
     problem: Problem, searched: Problem, solution: Solution, protected: Collection[int] = ()
 ) -> Solution:
-    """Return an answer to ``within_limits(problem)`` as one to the problem itself.
+    """Return a solution of ``within_limits(problem)`` as a solution of the problem itself.
 
-    Contacts come first until the recorder is within its limit. What was optimal there need not be
-    so here.
+    Contacts come first until the recorder is within its limit. A plan that was optimal there need
+    not be optimal here.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def replanned(
     seed: int,
     known: KnownMultipliers | None = None,
 ) -> Solution:
-    """Return the plan that follows the base, from whatever it begins with.
+    """Return the plan that follows the base, even if the problem begins beyond limits.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def replanned(
     Raises
     ------
     InvalidScenario
-        ``promise_not_kept``
+        ``promise_not_kept``: as in ``solve_replan``.
     """
     problem = question.problem
     found = solve_replan(replace(question, problem=searched), solver, budget, seed, known)
@@ -112,7 +112,7 @@ def _is_too_full(satellite: SatelliteProblem) -> bool:
 
 
 def _relieved(problem: Problem, index: int) -> SatelliteProblem:
-    """Return a satellite from whose start all that may be flown keeps the limits."""
+    """Return the satellite with a start from which all that may be flown keeps the limits."""
     satellite = problem.satellites[index]
     if _is_too_full(satellite):
         r = satellite.resources
@@ -130,7 +130,7 @@ def _relieved(problem: Problem, index: int) -> SatelliteProblem:
 
 
 def _keeps_limits(problem: Problem, index: int, satellite: SatelliteProblem) -> bool:
-    """Return whether what a satellite must take, and contacts, may keep the limits."""
+    """Return whether a satellite may keep the limits with its kept actions and contacts."""
     satellites = [*problem.satellites]
     satellites[index] = satellite
     own = set(satellite.rows.tolist())
@@ -140,7 +140,7 @@ def _keeps_limits(problem: Problem, index: int, satellite: SatelliteProblem) -> 
 
 
 def _emptied(problem: Problem, index: int, satellite: SatelliteProblem) -> SatelliteProblem:
-    """Return the satellite with a recorder in which what is kept, and telemetry, finds room."""
+    """Return the satellite with enough room in the recorder for kept actions and telemetry."""
     r = satellite.resources
     over = _levels(problem, index, satellite).recorder.max() - r.recorder_max_fraction
     start = max(0.0, r.initial_recorder_fraction - max(0.0, over + _CLEARLY))
@@ -148,7 +148,7 @@ def _emptied(problem: Problem, index: int, satellite: SatelliteProblem) -> Satel
 
 
 def _charged(problem: Problem, index: int, satellite: SatelliteProblem) -> SatelliteProblem:
-    """Return the satellite with a battery that lasts for what is kept."""
+    """Return the satellite with a battery that lasts for the kept actions."""
     r = satellite.resources
     under = r.battery_min_fraction - _levels(problem, index, satellite).battery.min()
     start = min(1.0, r.initial_battery_fraction + max(0.0, under + _CLEARLY))
@@ -156,13 +156,13 @@ def _charged(problem: Problem, index: int, satellite: SatelliteProblem) -> Satel
 
 
 def _unlimited(satellite: SatelliteProblem) -> SatelliteProblem:
-    """Return the satellite with no limits but those of battery and recorder themselves."""
+    """Return the satellite with no limits but an empty battery and a full recorder."""
     r = replace(satellite.resources, recorder_max_fraction=1.0, battery_min_fraction=0.0)
     return replace(satellite, resources=r)
 
 
 def _levels(problem: Problem, index: int, satellite: SatelliteProblem) -> Curve:
-    """Return battery and recorder of a satellite that does what it must and nothing else."""
+    """Return battery and recorder of a satellite that only carries out its kept actions."""
     table = problem.opportunities
     rows = [row for row in problem.kept_rows.tolist() if table.satellite[row] == index]
     return integrate(problem, satellite, Plan.of(problem, rows)).curve
@@ -171,8 +171,9 @@ def _levels(problem: Problem, index: int, satellite: SatelliteProblem) -> Curve:
 def _with_relief(problem: Problem, index: int, rows: set[int]) -> set[int]:
     """Return the plan's rows with contacts until the recorder of a satellite is within its limit.
 
-    The earliest ones that can stand beside what is kept; other tasks make room, and images that
-    would fill it meanwhile. The rows themselves where some plan is within its limit throughout.
+    These are the earliest contacts that do not conflict with kept rows. Tasks that conflict with
+    them are dropped, and so are images that would fill the recorder meanwhile. Returns the same
+    rows if some plan keeps the limit throughout.
     """
     from_s = beyond_from_s(problem, index)
     if from_s is None:

@@ -1,4 +1,4 @@
-"""The plan before, made to keep the limits again where something of it is lost."""
+"""Repair of the previous plan: it keeps the limits again after some of it is lost."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _MOST_TRIED: Final = 30  # contacts in place of a lost one
 
 
 def repaired(problem: Problem, rows: Collection[int], protected: Collection[int]) -> Plan:
-    """Return a plan that is valid, by contacts added and images dropped, as far as that goes.
+    """Return a plan made valid by adding contacts and dropping tasks, as far as possible.
 
     Parameters
     ----------
     rows
-        The plan to repair; what must be taken is taken as well.
+        The plan to repair; rows that every plan must hold are added.
     protected
         Rows that are dropped last.
     """
@@ -42,7 +42,7 @@ def repaired(problem: Problem, rows: Collection[int], protected: Collection[int]
 
 
 def _with_contact(problem: Problem, plan: Plan, broken: Violation) -> Plan | None:
-    """Return the plan with one more contact before the recorder is full, where one helps."""
+    """Return the plan with one more contact before the recorder is full, if one helps."""
     table = problem.opportunities
     taken = [action.opportunity for action in plan.actions]
     own = problem.satellites[broken.satellite].rows
@@ -68,7 +68,7 @@ def _with_contact(problem: Problem, plan: Plan, broken: Violation) -> Plan | Non
 def _shed(
     problem: Problem, plan: Plan, broken: Violation, protected: Collection[int]
 ) -> Plan | None:
-    """Return the plan without one action that has a part in what breaks; None for none left."""
+    """Return the plan without one action that contributes to a violation; None if none is left."""
     table, kept = problem.opportunities, set(problem.kept_rows.tolist())
     blamed = [plan.actions[p].opportunity for p in broken.blamed]
     ahead = [
@@ -78,7 +78,7 @@ def _shed(
         and action.start_s <= broken.at_s + TIME_TOLERANCE_S
         and (table.kind[action.opportunity] == COLLECT or broken.code == "battery")
     ]
-    # Where what is frozen leads beyond a limit, what makes it worse comes after that.
+    # If frozen actions lead beyond a limit, actions that make it worse come later and are blamed.
     candidates = [*ahead, *reversed(blamed)] if broken.code in LIMITS else [*blamed, *ahead]
     loose = [row for row in candidates if row not in kept]
     if not loose:

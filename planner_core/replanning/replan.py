@@ -1,8 +1,8 @@
-"""A plan that follows another one, and what no such plan exceeds.
+"""A plan that follows another one, and a bound on what any such plan earns.
 
-The search begins with the plan before, as far as it still holds, and is paid for each of its
-actions that it keeps: a move is made only where it gains more than the changes cost. What was asked
-for is proven afterwards, on the problem as it is: the bound is of the reward alone.
+The search starts from the previous plan, as far as it still holds, and gets a bonus for each of
+its actions that it keeps: a move is made only if it gains more than the changes cost. The bound is
+proven afterwards on the problem itself, so it is a bound on the reward alone.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from planner_core.solvers.base import Solution, Solver
 
 _MOVES_A_TASK: Final = 0.3
 _LEAST_MOVES: Final = 600
-_SHARE: Final = 0.4  # of the time, for the first plan, and of what is left for moves from there
-_DAYS: Final = 0.4  # of what is left then, for the one that does not
+_SHARE: Final = 0.4  # of the time for the first plan, and of what is left for moves from there
+_DAYS: Final = 0.4  # of what is left then, for the search that ignores changes
 _REST: Final = 0.8  # of what is left then, for the proof
 _EQUAL: Final = 1e-9
 _LEAST_FEWER_S: Final = 0.8
 _MOST_FEWER_S: Final = 2.0
-"""Of a search for the same worth with fewer changes: after six hours of safe mode on one satellite
-0.5 CPU seconds found 100 changes where the plan at hand had 79, 0.8 with that plan 76, and no plan
-has fewer, as was proven after 2."""
+"""Time for a search for the same worth with fewer changes: after six hours of safe mode on one
+satellite, 0.5 CPU seconds found 100 changes while the current plan had 79; 0.8 s with that plan
+found 76, and 2 s proved that no plan has fewer."""
 _TRIES: Final = 8
-"""Of moves near what is new, each from the same start: of 16 urgent requests of reward 10 at
-24 x 10,000 the first try gained 8.2 on average, the best of four 8.6, the best of eight 8.9;
-with 3,500 moves a try in place of 600 no more, in eight times the time."""
+"""How often to try moves near the news, each time from the same start: for 16 urgent requests of
+reward 10 at 24 x 10,000 the first try gained 8.2 on average, the best of four 8.6, the best of
+eight 8.9; 3,500 moves a try instead of 600 gained no more, in eight times the time."""
 
 
 def solve_replan(
@@ -61,7 +61,7 @@ def solve_replan(
     Parameters
     ----------
     known
-        The multipliers of the plan before. They can spare the search for a proof.
+        The multipliers of the previous plan. They can make the search for a proof unnecessary.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def solve_replan(
     """
     problem = question.problem
     start = first_plan(question, budget.part(_SHARE))
-    # A time of their own: where the first plan takes a program, moves are what still betters it.
+    # Moves have their own time: if the first plan took an integer program, only they improve it.
     plan = _followed(question, start, budget.part(_SHARE), seed).with_kept(problem)
     gap, verdict = getattr(solver, "gap", 0.0), question.judged(plan)
     best = Incumbent(problem, budget, gap, plan, verdict=verdict)
@@ -84,7 +84,7 @@ def solve_replan(
         best.offer(plan)
         is_done = best.is_done
     if not is_done or not best.is_valid:
-        # Where plan and bound are apart another search may earn more, and proves how much.
+        # If plan and bound are apart, another search may earn more, and lowers the bound.
         found = solver.solve(problem, budget.part(_REST, ignored), seed)
         if found.proven is not None:
             best.lower(found.proven)
@@ -96,10 +96,10 @@ def solve_replan(
 
 
 def _is_no_more_open(question: Question, known: KnownMultipliers | None, best: Incumbent) -> bool:
-    """Return whether plan and bound are no further apart than in the plan before.
+    """Return whether plan and bound are no further apart than for the previous plan.
 
-    Then what is left open is nothing that has happened, and no reason to plan all anew. Asked where
-    news is new targets alone: of what is lost nobody knows what it would earn.
+    If so, the gap is not due to the news, and no reason to replan everything. This is only decided
+    if the news is new targets alone: what lost actions would have earned is unknown.
     """
     news, problem = question.news, question.problem
     if news is None or news.lost or known is None or problem.use_resources:
@@ -109,20 +109,20 @@ def _is_no_more_open(question: Question, known: KnownMultipliers | None, best: I
 
 
 def _touched(question: Question) -> list[int]:
-    """Return the satellites that something keeps from what they had, or that it leads too far."""
+    """Return satellites with blocked intervals, and those that the base leads beyond a limit."""
     outages = {one.satellite for one in question.problem.pinned.blocked}
     return sorted(_broken(question) | {one for one in outages if one is not None})
 
 
 def _broken(question: Question) -> set[int]:
-    """Return the satellites that the base, as far as it is left, leads beyond a limit."""
+    """Return the satellites that the rest of the base leads beyond a limit."""
     base = Plan.of(question.problem, question.base.tolist()).with_kept(question.problem)
     violations = question.judged(base).violations
     return {v.satellite for v in violations if v.code in LIMITS and not v.inherited}
 
 
 def first_plan(question: Question, budget: Budget) -> Plan:
-    """Return the base with what is promised, changed as little as limits demand."""
+    """Return the base with the promised targets, changed as little as the limits demand."""
     problem = question.problem
     protected = set(np.flatnonzero(question.is_promised).tolist())
     base = Plan.of(problem, question.base.tolist()).with_kept(problem)
@@ -137,7 +137,7 @@ def first_plan(question: Question, budget: Budget) -> Plan:
 
 
 def _followed(question: Question, start: Plan, budget: Budget, seed: int) -> Plan:
-    """Return a plan that is worth no less, changes counted: where news can touch it, if known."""
+    """Return a plan that is worth no less, kept actions counted, changed only near known news."""
     part = nearby(question, start)
     if part is None:
         return improved(question, start, budget, seed)
@@ -159,7 +159,7 @@ def improved(
     Parameters
     ----------
     num_tasks
-        Opportunities that moves are made for; all by default.
+        The number of opportunities that determines how many moves to make; all by default.
     """
     problem, searched = question.problem, question.searched
     num_tasks = len(problem.opportunities) if num_tasks is None else num_tasks
@@ -176,7 +176,7 @@ def improved(
 
 
 def _better_of(question: Question, plan: Plan, other: Plan, budget: Budget, seed: int) -> Plan:
-    """Return the plan, or the best mix of the base, it and one that earns more."""
+    """Return the plan or, if another earns more, the best mix of the base and both plans."""
     before, after = question.judged(plan).reward, question.judged(other).reward
     if (question.may_fly(other), after) <= (question.may_fly(plan), before + _EQUAL):
         return plan
@@ -189,11 +189,10 @@ def _better_of(question: Question, plan: Plan, other: Plan, budget: Budget, seed
 def _with_fewer_changes(
     question: Question, plans: Sequence[Plan], solver: Solver, budget: Budget, seed: int
 ) -> Plan:
-    """Return the best mix of plans with one that is searched for where kept actions count.
+    """Return the best mix of the plans with one from a search in which kept actions count.
 
-    That is the last of the plans, where what is left of the base breaks no limit, or where there is
-    no time: moves go no further than a few passes, and what keeps a battery above its limit may lie
-    hours before.
+    Moves reach only a few passes, but what keeps a battery above its limit may lie hours before.
+    Returns the last of the plans if the rest of the base breaks no limit, or if there is no time.
     """
     problem, own = question.problem, plans[-1]
     left_s = budget.remaining_s()
@@ -208,7 +207,7 @@ def _with_fewer_changes(
 
 
 def _best(question: Question, *plans: Plan) -> Plan:
-    """Return the plan that is valid, misses no promise and is worth most; of equals the first."""
+    """Return the valid plan that misses fewest promises, then is worth most, then comes first."""
 
     def rank(plan: Plan) -> tuple[bool, int, float]:
         return question.may_fly(plan), -len(question.missing(plan)), value(question, plan)
@@ -222,7 +221,7 @@ def _best(question: Question, *plans: Plan) -> Plan:
 
 
 def _first_bound(problem: Problem, known: KnownMultipliers | None, reward: float) -> Bound:
-    """Return what the multipliers of the plan before prove, or a bound made from nothing."""
+    """Return the bound from the previous plan's multipliers or, without those, a new one."""
     multipliers = None if known is None else known.on(problem)
     if multipliers is not None:
         return bound_at(problem, multipliers, reward)
@@ -236,7 +235,7 @@ def _solution(question: Question, plan: Plan, best: Incumbent, budget: Budget) -
     last = Incumbent(problem, budget, best.gap, plan, best.bound) if plan != best.plan else best
     solution = last.solution()
     kept = question.stable_worth(plan)
-    # No plan counts more than the best and all that may be kept.
+    # No plan counts more than the reward bound plus the bonus of keeping everything.
     summed = last.bound.value + float(question.bonus.sum())
     return replace(
         solution,
@@ -250,7 +249,7 @@ def _solution(question: Question, plan: Plan, best: Incumbent, budget: Budget) -
 
 
 def differences(question: Question, plan: Plan) -> dict[str, float]:
-    """Return how a plan differs from the base: what counts as kept, actions and parts changed."""
+    """Return how a plan differs from the base: bonus kept, actions changed, parts changed."""
     return {
         "stability": question.stable_worth(plan),
         "changed": float(question.changed(plan)),

@@ -1,8 +1,8 @@
-"""Changes taken back that gain nothing.
+"""Changes that gain nothing are undone.
 
-A change is a connected part of the symmetric difference of two plans: actions that image the same
-target, or that cannot stand in one plan. The smallest parts are tried first. Each is taken back
-where the referee finds the plan as valid and its worth, changes counted, no less.
+A change is a connected part of the symmetric difference of two plans, whose links are actions that
+image the same target or conflict. The smallest parts are tried first. A part is undone if the
+referee finds the result valid and its worth, kept actions counted, no less.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _EQUAL = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """A connected part of the difference: rows that a plan has anew, and rows that it dropped."""
+    """A connected part of the difference: the rows that a plan adds, and those that it drops."""
 
     added: frozenset[int]
     removed: frozenset[int]
@@ -34,7 +34,7 @@ class Part:
 
 
 def parts_of(question: Question, plan: Plan) -> list[Part]:
-    """Return what tells a plan from the base, in connected parts, the smallest first."""
+    """Return the difference between a plan and the base in connected parts, smallest first."""
     taken = {action.opportunity for action in plan.actions}
     base = set(question.base.tolist())
     added, removed = taken - base, base - taken
@@ -53,7 +53,7 @@ def parts_of(question: Question, plan: Plan) -> list[Part]:
 
 
 def _linked(question: Question, row: int, others: set[int]) -> Iterator[int]:
-    """Yield the rows of the other plan that ``row`` came for, or gave way to."""
+    """Yield the rows of the other plan that ``row`` replaced, or that replaced it."""
     table = question.problem.opportunities
     blocked = set(conflicts(question.problem, row, sorted(others)))
     for other in others:
@@ -65,7 +65,7 @@ def _linked(question: Question, row: int, others: set[int]) -> Iterator[int]:
 
 
 def undone(question: Question, plan: Plan, budget: Budget) -> Plan:
-    """Return the plan with every part of its difference taken back that gains nothing."""
+    """Return the plan with every part of its difference undone that gains nothing."""
     is_better = True
     while is_better:
         is_better = False
@@ -80,9 +80,9 @@ def undone(question: Question, plan: Plan, budget: Budget) -> Plan:
 
 
 def within_share(question: Question, plan: Plan, budget: Budget) -> Plan:
-    """Return the plan with changes taken back that gain least, until few enough are left.
+    """Return the plan with the changes undone that gain least, until few enough are left.
 
-    Once the time is over whichever comes first: the share holds all the same.
+    Once time is up, the first that can be undone is: the share must hold anyway.
     """
     share = question.stability.max_changed_share
     while share is not None and question.changed(plan) > share * question.num_base:
@@ -100,10 +100,10 @@ def within_share(question: Question, plan: Plan, budget: Budget) -> Plan:
 
 
 def without(question: Question, plan: Plan, part: Part, least: float = -math.inf) -> Plan | None:
-    """Return the plan without a part of its difference.
+    """Return the plan with a part of its difference undone.
 
-    None where that breaks something, or where what is taken cannot be worth ``least``: of 102 parts
-    of a good plan the referee need see a few only.
+    None if that breaks something, or if the rows left cannot be worth ``least``: so the referee
+    need replay only a few of the 102 parts of a good plan.
     """
     problem = question.problem
     if any(row in problem.kept_rows for row in part.added):
@@ -119,5 +119,5 @@ def without(question: Question, plan: Plan, part: Part, least: float = -math.inf
 
 
 def value(question: Question, plan: Plan) -> float:
-    """Return what a plan earns, and what its kept actions count."""
+    """Return what a plan earns plus the bonus of its kept actions."""
     return question.judged(plan).reward + question.stable_worth(plan)
