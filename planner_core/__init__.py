@@ -1,3 +1,3 @@
-"""The planning core: pure functions and frozen values, no web, no database."""
+"""The planning core: pure functions and frozen values, without web or database."""
 
 __version__ = "0.2.0.dev0"

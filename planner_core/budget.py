@@ -1,4 +1,4 @@
-"""What a job may spend, how it tells of its progress, and why it ends."""
+"""How much time a job may spend, how it reports progress, and why it ends."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from planner_core.errors import Cancelled
 Bytes = npt.NDArray[np.uint8]
 
 _LOOK_S: Final = 0.05
-"""Between two looks at the clock on behalf of kernels."""
+"""How often the clock is read on behalf of kernels."""
 
 
 class Termination(StrEnum):
@@ -34,7 +34,7 @@ class Termination(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """How far the work is. ``fraction`` counts within the phase, 0 to 1."""
+    """How far the work has got. ``fraction`` is that of the phase, 0 to 1."""
 
     phase: Literal["access", "compile", "solve", "verify"]
     fraction: float
@@ -44,11 +44,11 @@ class Progress:
 
 
 def ignored(_: Progress) -> None:
-    """Take a report that nobody is to see."""
+    """Ignore a progress report."""
 
 
 class Budget:
-    """Time and patience left for one job; the only clock in the core.
+    """The time left for one job, and whether it is cancelled; the only clock in the core.
 
     Parameters
     ----------
@@ -57,14 +57,14 @@ class Budget:
     report
         Called with each progress report.
     num_threads
-        How many threads may work at a time. What comes out does not depend on it, but for how
-        far a search gets before its time is over.
+        How many threads may work at a time. Results do not depend on it, except for how far a
+        search gets before its time is over.
 
     Attributes
     ----------
     stop
-        One byte that kernels read inside long loops: not 0 means "stop now". Whoever
-        cancels sets it through ``cancel``, from any thread. Shape ``(1,)``.
+        One byte that kernels read inside long loops; if not 0, they stop at once. ``cancel`` sets
+        it, from any thread. Shape ``(1,)``.
     """
 
     def __init__(
@@ -82,23 +82,23 @@ class Budget:
     def part(self, share: float = 1.0, report: Callable[[Progress], None] | None = None) -> Budget:
         """Return a budget for a part of the work, which ends with the whole or before it.
 
-        It works on as many threads, and is cancelled with the whole.
+        It has the same number of threads, and is cancelled with the whole.
 
         Parameters
         ----------
         share
-            Of the time that is left now, 0 to 1.
+            The share of the time now left, 0 to 1.
         report
-            Called with the part's progress; as the whole is by default.
+            Called with the part's progress; by default the same as for the whole.
         """
         return _Part(self, share, report or self.report)
 
     def until_cancelled(self) -> Budget:
-        """Return a budget for work that is of use only as a whole: the time does not end it."""
+        """Return a budget for work that is useful only if complete: the time does not end it."""
         return _Whole(self)
 
     def proceed(self, progress: Progress) -> None:
-        """Report the progress of work that is of use only as a whole, unless it has to stop.
+        """Report the progress of work that is useful only if complete, unless it has to stop.
 
         Raises
         ------
@@ -115,13 +115,13 @@ class Budget:
         self.stop[0] = 1
 
     def expire(self) -> None:
-        """Stop kernels because the time is over (they cannot read a clock themselves)."""
+        """Stop kernels because the time is over; they cannot read a clock themselves."""
         self._deadline = time.monotonic()
         self.stop[0] = 1
 
     @contextmanager
     def enforced(self) -> Iterator[None]:
-        """Expire once the time of the whole is over, so that kernels end as well."""
+        """Call ``expire`` once the time of the whole is over, so that kernels stop as well."""
         if self._deadline is None:
             yield
             return
@@ -147,13 +147,13 @@ class Budget:
         return bool(self._cancelled[0])
 
     def is_spent(self) -> bool:
-        """Return whether the work should stop now and answer with the best it has."""
+        """Return whether the work should stop now and return the best it has."""
         return bool(self.stop[0]) or (
             self._deadline is not None and time.monotonic() >= self._deadline
         )
 
     def remaining_s(self) -> float | None:
-        """Return the seconds left, or None where there is no limit."""
+        """Return the seconds left, or None if there is no limit."""
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
 
     def termination(self) -> Termination:
@@ -161,7 +161,7 @@ class Budget:
         return Termination.CANCELLED if self.is_cancelled else Termination.TIME_LIMIT
 
     def ending(self, *, is_optimal: bool, is_close: bool) -> Termination:
-        """Return why a search for plan and bound has ended: by what it found, or by the budget."""
+        """Return why a search for plan and bound has ended: due to its result, or the budget."""
         if is_optimal:
             return Termination.OPTIMAL
         if is_close:
@@ -170,7 +170,7 @@ class Budget:
 
 
 class _Part(Budget):
-    """What a part of the work may spend: the whole tells the time, and must not be outlived."""
+    """The budget of a part of the work, which ends no later than the whole and uses its clock."""
 
     def __init__(self, whole: Budget, share: float, report: Callable[[Progress], None]) -> None:
         super().__init__(None, report, whole.num_threads)
@@ -178,7 +178,7 @@ class _Part(Budget):
         self._cancelled = whole._cancelled
         self._whole = whole
         left_s = whole.remaining_s()
-        # What remains to the whole after this part, by its own clock.
+        # What the whole has left after this part.
         self._reserve_s = 0.0 if left_s is None else (1.0 - share) * left_s
 
     def cancel(self) -> None:
@@ -196,7 +196,7 @@ class _Part(Budget):
 
 
 class _Whole(Budget):
-    """What is needed before there can be any plan: it ends when somebody cancels."""
+    """The budget of work without which there is no plan: it only ends if somebody cancels."""
 
     def __init__(self, whole: Budget) -> None:
         super().__init__(None, whole.report, whole.num_threads)

@@ -37,7 +37,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
     Raises
     ------
     Cancelled
-        The budget was spent first.
+        The budget is spent before the problem is complete.
     InvalidScenario
         A pin is impossible.
     """
@@ -99,7 +99,7 @@ def build_problem(scenario: Scenario, computed: ScenarioOpportunities, budget: B
 
 
 def _flown_problem(past: Past, budget: Budget) -> Problem:
-    """Return the problem of what a satellite did before the horizon, and of nothing else."""
+    """Return the problem that holds only what a satellite did before the horizon."""
     part = past.part()
     (satellite,) = part.satellites
     return build_problem(
@@ -115,12 +115,12 @@ def _flown_problem(past: Past, budget: Budget) -> Problem:
 
 
 def _with_frozen(scenario: Scenario, table: Opportunities) -> tuple[Opportunities, Ints | None]:
-    """Return the table with each frozen action at its own instants, and the rows that these are of.
+    """Return the table with each frozen action at its own instants, and the original rows.
 
     Raises
     ------
     InvalidScenario
-        ``frozen_not_kept``: by newer elements its satellite does not see its place then.
+        ``frozen_not_kept``: with newer elements the satellite does not see the action's site then.
     """
     replan, horizon = scenario.replan, scenario.horizon
     if replan is None:

@@ -1,14 +1,14 @@
 """Named tuples of arrays that kernels take as one pointer.
 
-Numba hands a named tuple over as all its members, an array as seven of them: a call with a
-``Track`` had more than two hundred arguments, each written out at every step of compilation, and
-most of the time of compilation went there. A class with the mark ``bundle`` is laid out in memory
-instead, when Python calls a kernel, and its members are read from there where they are used.
+Numba passes a named tuple as all its members, and an array as seven values: a call with a
+``Track`` had more than two hundred arguments, each written out at every step of compilation, which
+took most of the compilation time. A class decorated with ``bundle`` is laid out in memory instead
+when Python calls a kernel, and its members are read from there when they are used.
 
-That memory never changes while the kernel runs (the arrays' elements may), and the loads say so
-to the optimizer, which keeps members in registers as it did before. Kernels read members by name,
-and hand a bundle on as it is; they can neither make nor return one. What a bundle holds of other
-bundles lies within it, and is handed on as a pointer too.
+That memory never changes while the kernel runs (the arrays' elements may). The loads tell the
+optimizer so, which keeps members in registers as it did before. Kernels read members by name and
+pass a bundle on as it is; they can neither make nor return one. A bundle within a bundle lies in
+the same memory and is passed on as a pointer too.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ class BundleType(types.Type):
     def __init__(self, of: type, members: tuple[types.Type, ...]):
         self.of = of
         self.members = members
-        names: Any = of  # a named tuple's class, which types do not tell
-        # Kept on disk with what was compiled: members of other names are another bundle.
+        names: Any = of  # a named tuple's class, which the annotation cannot say
+        # Stored on disk with compiled code: other member names make a different bundle.
         self.names: tuple[str, ...] = names._fields
         spelt = hashlib.sha256(repr((self.names, members)).encode()).hexdigest()[:8]
         super().__init__(name=f"{of.__name__}.{spelt}")
 
     @property
     def key(self) -> tuple[type, tuple[str, ...], tuple[types.Type, ...]]:
-        """What makes two such types the same."""
+        """The values that identify the type."""
         return self.of, self.names, self.members
 
     @cached_property
@@ -65,12 +65,12 @@ class BundleType(types.Type):
 
     @property
     def num_words(self) -> int:
-        """How much memory the members take."""
+        """The memory that the members take, in words."""
         return sum(_words(member) for member in self.members)
 
 
 def _inside(member: Any) -> tuple[types.Type, ...] | None:
-    """Return the types of what a bundle or a tuple holds; None for anything else."""
+    """Return the types of the members of a bundle or tuple; None for anything else."""
     if isinstance(member, BundleType):
         return member.members
     held: Any = member
@@ -78,7 +78,7 @@ def _inside(member: Any) -> tuple[types.Type, ...] | None:
 
 
 def _words(member: types.Type) -> int:
-    """Return a data pointer and a shape for an array, else one word for each scalar."""
+    """Return the number of words: data pointer and shape for an array, one for a scalar."""
     inside = _inside(member)
     if inside is not None:
         return sum(map(_words, inside))
@@ -117,7 +117,7 @@ class _Attributes(AttributeTemplate):
 
 
 def _at(builder: Any, base: Any, word: int, kind: Any) -> Any:
-    """Return a pointer to what lies at ``word``."""
+    """Return a pointer to the value at ``word``."""
     return builder.bitcast(
         builder.gep(base, [_I64(_WORD * word)], inbounds=True), kind.as_pointer()
     )
@@ -136,7 +136,7 @@ def _member(context: Any, builder: Any, bundle_type: BundleType, base: Any, name
 
 
 def _read(context: Any, builder: Any, member: types.Type, base: Any, word: int) -> Any:
-    """Return the value that lies at ``word``."""
+    """Return the value at ``word``."""
     if isinstance(member, BundleType):
         return _at(builder, base, word, _I8)
     inside = _inside(member)
@@ -184,7 +184,7 @@ def _unbox(bundle_type: BundleType, instance: Any, c: Any) -> NativeValue:
 
 
 def _lay(c: Any, base: Any, word: int, member: types.Type, item: Any, is_error: Any) -> None:
-    """Write a Python object to ``word``, and what it holds behind one another."""
+    """Write a Python object to ``word``, its members one after another."""
     inside = _inside(member)
     if inside is not None:
         for place, inner in enumerate(inside):
@@ -204,7 +204,7 @@ def _lay(c: Any, base: Any, word: int, member: types.Type, item: Any, is_error: 
 def _lay_array(c: Any, base: Any, word: int, member: types.Array, item: Any) -> None:
     array = c.context.make_array(member)(c.context, c.builder)
     pointer = c.builder.bitcast(array._getpointer(), _I8.as_pointer())
-    # Without a reference of its own: the caller's tuple holds the array meanwhile.
+    # It takes no reference of its own: the caller's tuple holds the array meanwhile.
     kind = ir.FunctionType(ir.IntType(32), [item.type, pointer.type])
     adapt = cgutils.get_or_insert_function(c.builder.module, kind, "numba_adapt_ndarray")
     c.builder.call(adapt, [item, pointer])
@@ -216,7 +216,7 @@ def _lay_array(c: Any, base: Any, word: int, member: types.Array, item: Any) -> 
 def _settled(builder: Any, base: Any) -> Any:
     """Return the pointer as one that the optimizer knows nothing about.
 
-    A load that is called invariant may move up to where its pointer comes from: not above this.
+    A load marked invariant may move up to where its pointer is made, but not above this call.
     """
     barrier = ir.InlineAsm(
         ir.FunctionType(base.type, [base.type]), "", "=r,0,~{memory}", side_effect=True

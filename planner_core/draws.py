@@ -1,4 +1,4 @@
-"""Random numbers inside kernels, repeatable from a seed and independent of any other."""
+"""Random numbers inside kernels, repeatable from a seed and independent of other generators."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def draws_of(seed: int) -> Uint64s:
 
 @borrowing_inner
 def next_draw(state: Uint64s) -> float:
-    """Return the next number in [0, 1) of a generator (splitmix64) that is ours alone."""
+    """Return the next number in [0, 1) of a generator (splitmix64)."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -1,7 +1,7 @@
 """What can be wrong with data given to the planner.
 
-``ValueError`` is kept for a caller's mistake in code. Everything here is about
-*data*: it carries what a machine needs (code, place) and a sentence for people.
+``ValueError`` is kept for mistakes in calling code. Everything here is about
+*data*: it carries what a machine needs (code, position) and a sentence for people.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class Fault:
     detail
         One sentence that names the value and the limit.
     pointer
-        JSON pointer into the input, where it was JSON.
+        JSON pointer into the input, if that was JSON.
     row
-        Line of the file, from 1, where it was a file.
+        Line of the file, from 1, if the input was a file.
     """
 
     code: str
@@ -44,12 +44,12 @@ class PlannerError(Exception):
 
     @property
     def code(self) -> str:
-        """Return the machine-readable name of the fault."""
+        """The machine-readable name of the fault."""
         return self.fault.code
 
     @property
     def detail(self) -> str:
-        """Return the sentence for people."""
+        """The sentence for people."""
         return self.fault.detail
 
 
@@ -58,7 +58,7 @@ class InvalidElements(PlannerError):
 
 
 class InvalidScenario(PlannerError):
-    """A planning question that makes no sense as a whole."""
+    """A scenario that makes no sense as a whole."""
 
 
 class InvalidParameters(PlannerError):
@@ -88,7 +88,7 @@ class PropagationFailed(PlannerError):
 
 @contextmanager
 def pointing(place: Callable[[Fault], str | None]) -> Iterator[None]:
-    """Let errors raised within point elsewhere: to what ``place`` returns for their fault."""
+    """Set the pointer of errors raised within to what ``place`` returns for their fault."""
     try:
         yield
     except PlannerError as error:
@@ -97,9 +97,9 @@ def pointing(place: Callable[[Fault], str | None]) -> Iterator[None]:
 
 
 def inside(pointer: str) -> AbstractContextManager[None]:
-    """Put a pointer in front of those of the errors raised within."""
+    """Prefix the pointers of errors raised within with ``pointer``."""
     return pointing(lambda fault: pointer + (fault.pointer or ""))
 
 
 class Cancelled(Exception):
-    """Work that has no partial answer was told to stop (access search, compiling)."""
+    """Work without a partial result was told to stop (access search, compiling)."""

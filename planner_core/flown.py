@@ -1,8 +1,8 @@
-"""From the state of a satellite to the horizon by what it flew in between.
+"""Carry the state of a satellite to the start of the horizon by the actions flown in between.
 
-Energy is the referee's, over the actions that were done. Data is a queue, first in, first out:
-images and telemetry go in at its end, contacts take away at its beginning. What was reported in
-megabits counts in place of what was planned.
+Energy is computed by the referee, over the actions that were done. Data is a queue, first in,
+first out: images and telemetry enter at its end, contacts remove from its beginning. Amounts
+reported in megabits replace the planned ones.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ class Past:
     Attributes
     ----------
     index
-        Of the satellite in the scenario.
+        Index of the satellite in the scenario.
     state
-        Where it begins.
+        The state that the past begins with.
     before
-        An older state, where that one does not say what is on board.
+        An older state, if ``state`` does not list what is on board.
     flown
-        In order of start; those that end before the state say only where it looked.
+        Actions in order of start; those that end before the state only tell where it looked.
     following
-        Its first action after the horizon's start, where that stays as it is.
+        The satellite's first action after the horizon's start, if that is frozen.
     """
 
     scenario: Scenario
@@ -56,7 +56,7 @@ class Past:
 
     @property
     def done(self) -> list[Flown]:
-        """What drew energy after the state."""
+        """The actions that drew energy after the state."""
         return [f for f in self.flown if f.outcome != "skipped" and f.end > self.state.at]
 
     @property
@@ -68,7 +68,7 @@ class Past:
 
     @property
     def of_data(self) -> Past:
-        """The same from the older state on, where there is one."""
+        """The same past, but from the older state on if there is one."""
         return self if self.before is None else replace(self, state=self.before, before=None)
 
     def part(self) -> Scenario:
@@ -90,7 +90,7 @@ class Past:
         )
 
     def given(self, part: Scenario) -> list[Given]:
-        """Return what was done, and what follows, as tasks of ``part``."""
+        """Return what was done and the following action as tasks of ``part``."""
         tasks = [*self.done, *([] if self.following is None else [self.following])]
         return [given_of(part, 0, task) for task in tasks]
 
@@ -108,7 +108,7 @@ def given_of(scenario: Scenario, index: int, task: Flown) -> Given:
 
 
 def pasts_of(scenario: Scenario) -> dict[int, Past]:
-    """Return, by index, the satellites that flew anything between their state and the horizon."""
+    """Return the pasts of satellites that flew anything before the horizon, by index."""
     if scenario.replan is None or not scenario.replan.flown:
         return {}
     states = {state.satellite_id: state for state in scenario.states}
@@ -131,7 +131,7 @@ def pasts_of(scenario: Scenario) -> dict[int, Past]:
 
 
 def _following(scenario: Scenario, satellite_id: str) -> Flown | None:
-    """Return the first action that is frozen and begins within the horizon."""
+    """Return the satellite's first frozen action that begins within the horizon."""
     replan, start = scenario.replan, scenario.horizon.start
     assert replan is not None
     frozen = [
@@ -146,7 +146,7 @@ def _following(scenario: Scenario, satellite_id: str) -> Flown | None:
 
 
 def flown_as(action: PinnedAction) -> Flown:
-    """Return an action that has a satellite, a start and an end as if it were flown."""
+    """Return an action with satellite, start and end as if it were flown."""
     assert action.satellite_id is not None
     assert action.start is not None
     assert action.end is not None
@@ -162,11 +162,11 @@ def carried(past: Past, part: Problem, of_data: Problem, given_start: Start) -> 
     Parameters
     ----------
     part
-        The problem of ``past.part()``, with what was done, in order, as its opportunities.
+        The problem of ``past.part()``, whose opportunities are the actions done, in order.
     of_data
-        The same of ``past.of_data``.
+        The same for ``past.of_data``.
     given_start
-        What it would begin with had it only idled since its state.
+        What the satellite would begin with if it had only idled since its state.
     """
     scenario, horizon = past.scenario, past.scenario.horizon
     satellite = part.satellites[0]
@@ -202,7 +202,7 @@ def _heading_after(past: Past, part: Problem, last: Flown) -> tuple[Heading | No
     satellite = scenario.satellites[past.index]
     free_from_s = horizon.offset_s(last.end)
     if free_from_s > 0.0:
-        return None, 0.0  # it still goes on, and is kept
+        return None, 0.0  # the action still goes on, and is kept
     around = replace(
         past.part(), horizon=Horizon(start=last.start, end=last.end + _MARGIN), states=()
     )
@@ -226,7 +226,7 @@ def _heading_after(past: Past, part: Problem, last: Flown) -> tuple[Heading | No
         leaves_s = horizon.offset_s(past.following.start) - back_s
     if leaves_s < at_sun_s:
         return heading, 0.0  # no time for a visit
-    # On its way to the next action already: nothing else can begin before that one.
+    # It may already be on its way to the next action; nothing else can begin before that one.
     return Heading(free_from_s=at_sun_s if leaves_s < 0.0 else 0.0), 0.0
 
 
@@ -251,7 +251,7 @@ class _Recorder:
             amount -= gone
 
     def correct(self, level: float) -> None:
-        """Take away what came down unnoticed, or add what nobody told of."""
+        """Remove what was downlinked without a report, or add data that was not reported."""
         missing = level - sum(item.amount for item in self.items)
         if missing < 0.0:
             self.take(-missing)
@@ -265,7 +265,7 @@ class _Recorder:
 def _queue(past: Past, part: Problem) -> tuple[ImageOnBoard, ...]:
     """Return what the recorder holds when the horizon begins; images on the ground have 0.
 
-    ``part`` is of ``past.of_data``.
+    ``part`` is the problem of ``past.of_data``.
     """
     told, past = past.state, past.of_data
     resources = past.scenario.satellites[past.index].resources
@@ -298,7 +298,7 @@ def _queue(past: Past, part: Problem) -> tuple[ImageOnBoard, ...]:
 
 
 def _recorder_at(past: Past) -> _Recorder:
-    """Return the recorder at the state: what is listed, and then what else it holds."""
+    """Return the recorder at the state: first the listed images, then what else it holds."""
     scenario, state, index = past.scenario, past.state, past.index
     resources = scenario.satellites[index].resources
     targets = {target.id: i for i, target in enumerate(scenario.targets)}
@@ -311,7 +311,7 @@ def _recorder_at(past: Past) -> _Recorder:
         recorder.put(_image(index, target, amount, collected_s, worth))
     listed_targets = {image.target for image in recorder.items}
     for flown in past.flown if state.on_board is not None else ():
-        # What telemetry does not list any more is on the ground.
+        # Images that the state no longer lists are on the ground.
         if flown.is_imaged and flown.end <= state.at:
             target = targets[flown.target_id or ""]
             if target not in listed_targets:
@@ -326,7 +326,7 @@ def _recorder_at(past: Past) -> _Recorder:
 
 
 def _record(past: Past, part: Problem, row: int, flown: Flown, recorder: _Recorder) -> None:
-    """Let an action write into a recorder, or take from it."""
+    """Add to a recorder what an action writes, or remove what it takes down."""
     scenario, amount = past.scenario, _amount(past, part, row, flown)
     if flown.target_id is None:
         recorder.take(amount)
@@ -348,7 +348,7 @@ def _image(
 
 
 def _without_overflow(images: Sequence[ImageOnBoard]) -> tuple[ImageOnBoard, ...]:
-    """Return what fits: a full recorder takes nothing more."""
+    """Return the images as far as they fit: a full recorder accepts no more data."""
     found, room = [], 1.0
     for image in images:
         amount = min(image.amount, room)
@@ -358,7 +358,7 @@ def _without_overflow(images: Sequence[ImageOnBoard]) -> tuple[ImageOnBoard, ...
 
 
 def _amount(past: Past, part: Problem, row: int, flown: Flown) -> float:
-    """Return what an action recorded or took down between the state and the horizon."""
+    """Return how much an action recorded or took down between the state and the horizon."""
     resources = past.scenario.satellites[past.index].resources
     whole_s = (flown.end - flown.start).total_seconds()
     begin, end = max(flown.start, past.state.at), min(flown.end, past.scenario.horizon.start)
@@ -377,7 +377,7 @@ def _since(past: Past, instant: datetime) -> float:
 
 
 def _taken_down(part: Problem, row: int, start_s: float, begin_s: float, end_s: float) -> float:
-    """Return what a contact takes down from ``begin_s`` on that was set up from its own start."""
+    """Return what a contact takes down from ``begin_s`` on; its set-up begins at ``start_s``."""
     pieces = flow(part, part.satellites[0], Action(start_s, end_s, row))
     from_s, to_s, per_s = pieces.T
     return float(np.sum(np.maximum(to_s - np.maximum(from_s, begin_s), 0.0) * per_s))

@@ -1,4 +1,4 @@
-"""From the state of a satellite to the horizon: it does nothing but look at the sun."""
+"""Carry the state of a satellite to the start of the horizon while it only points at the sun."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from planner_core.problem import (
 )
 from planner_core.problem.sun_turns import sun_turn_s
 
-_A_MOMENT = timedelta(minutes=1)  # of orbit, to see what a satellite looks at
+_A_MOMENT = timedelta(minutes=1)  # of orbit, to find where a satellite looks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,11 +44,11 @@ class Start:
     Attributes
     ----------
     heading
-        Where it looks; None where that is not known.
+        Where it looks; None if unknown.
     sun_from_s
-        When it can have its panels at the sun first.
+        When its panels can first be at the sun.
     images
-        What its recorder holds, the first to come down first.
+        The images in its recorder, in the order of downlink.
     """
 
     resources: Resources
@@ -58,11 +58,10 @@ class Start:
 
 
 def started(scenario: Scenario, index: int, state: State | None, table: Opportunities) -> Start:
-    """Return what a satellite has, and where it looks, at the horizon's start.
+    """Return a satellite's resources and line of sight at the horizon's start.
 
-    From the state's instant on it idles: it turns to the sun, its panels charge where that is
-    seen, and telemetry runs into the recorder. No turn is counted where it is not known where the
-    satellite looked.
+    From the state's instant on it idles: it turns to the sun, its panels charge in sunlight, and
+    telemetry fills the recorder. No turn is counted if it is unknown where the satellite looked.
 
     Raises
     ------
@@ -83,7 +82,7 @@ def started(scenario: Scenario, index: int, state: State | None, table: Opportun
     resources = _carried(satellite, state, scenario.horizon, turn_s)
     is_free = satellite.resources.sun_pointing == "free"
     if seen is not None and not is_free and turn_s <= waited_s:
-        # By then it is at the sun, as whoever idles is.
+        # By then it is at the sun, as idle satellites are.
         seen = Heading(free_from_s=0.0)
     return Start(
         resources=resources, heading=seen, sun_from_s=max(0.0, turn_s - waited_s), images=images
@@ -125,7 +124,7 @@ def _turn_to_sun_s(satellite: Satellite, state: State, seen: Heading | None) -> 
 
 
 def heading_of(scenario: Scenario, index: int, state: State, table: Opportunities) -> Heading:
-    """Return where a satellite looks by the attitude of its state."""
+    """Return where a satellite looks according to the attitude in its state."""
     attitude = state.attitude
     assert attitude is not None
     free_from_s = scenario.horizon.offset_s(state.at)
@@ -154,7 +153,7 @@ def _triple(vector: Floats) -> tuple[float, float, float]:
 def _tracked(
     scenario: Scenario, index: int, attitude: Attitude, table: Opportunities
 ) -> Target | GroundStation:
-    """Return the place that an attitude names."""
+    """Return the target or station that an attitude names."""
     named: Sequence[Target | GroundStation]
     if attitude.opportunity_id is not None:
         found = re.fullmatch(r"o(\d{1,9})", attitude.opportunity_id, re.ASCII)
@@ -197,13 +196,13 @@ def _images(scenario: Scenario, index: int, state: State) -> tuple[ImageOnBoard,
 
 
 def sunlit_from(lit: Sunlight, from_s: float) -> Sunlight:
-    """Return the time in sunlight from an instant on."""
+    """Return the intervals in sunlight from an instant on."""
     is_left = lit.exit_s > from_s
     return Sunlight(enter_s=np.maximum(lit.enter_s[is_left], from_s), exit_s=lit.exit_s[is_left])
 
 
 def battery_after(resources: Resources, battery: float, lit: Sunlight, span_s: float) -> float:
-    """Return what a battery holds after a span of idling, as a fraction of capacity.
+    """Return a battery's level after a span of idling, as a fraction of capacity.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How hot loops are compiled: once, cached on disk, without the interpreter lock."""
+"""Compilation of hot loops: once, cached on disk, run without the interpreter lock."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _DISPATCHERS: Final[list[Any]] = []
 
 
 def compiled_kernels() -> list[Any]:
-    """Return Numba's dispatchers of all kernels that are compiled on their own, as imported."""
+    """Return Numba's dispatchers of all kernels imported so far that are compiled separately."""
     return list(_DISPATCHERS)
 
 
 def stored_signatures() -> dict[str, list[str]]:
-    """Return with which arguments each of these is compiled on disk, by its full name."""
+    """Return the signatures for which each of these is compiled on disk, by its full name."""
     return {
         f"{each.py_func.__module__}.{each.py_func.__qualname__}": [
             str(signature) for signature in each._cache.signatures()
@@ -35,29 +35,29 @@ def stored_signatures() -> dict[str, list[str]]:
 
 
 def load_stored() -> None:
-    """Load from disk all that Python calls of the modules imported by now."""
+    """Load from disk all kernels that Python calls in the modules imported so far."""
     for each in _DISPATCHERS:
         if _is_for_kernels(each):
-            continue  # it is part of those that call it
+            continue  # it is compiled into its callers
         for signature in each._cache.signatures():
             each.compile(signature)
 
 
 def all_stamps() -> str:
-    """Return a hash of what decides all that is compiled, of the modules imported by now."""
+    """Return a hash of all that decides the compiled code of the modules imported so far."""
     stamps = sorted(stamp(each) for each in _DISPATCHERS)
     return hashlib.sha256("".join(stamps).encode()).hexdigest()
 
 
 def kernel(function: F) -> F:
-    """Compile a loop over plain arrays; type checkers keep seeing the Python function."""
+    """Compile a loop over plain arrays; type checkers still see the Python function."""
     return _once(function)
 
 
 def inner(function: F) -> F:
-    """Compile a piece of kernels that only they call.
+    """Compile a function that only kernels call.
 
-    What Python needs to call it is left out; Python runs the function as it is written.
+    The wrapper for calls from Python is left out; Python runs the function uncompiled.
     """
     return _once(function, no_cpython_wrapper=True)
 
@@ -65,14 +65,14 @@ def inner(function: F) -> F:
 def borrowing(function: F) -> F:
     """Compile a loop that makes no arrays of its own: no slices, no ``np.empty``.
 
-    It then counts no references. Handing a tuple of arrays from kernel to kernel counts one
-    up and down for each array, atomically, which made a search ten times as slow.
+    It then counts no references. Passing a tuple of arrays between kernels counts one up and
+    down for each array, atomically, which made a search ten times as slow.
     """
     return _once(function, _nrt=False)
 
 
 def borrowing_inner(function: F) -> F:
-    """Compile a piece of kernels that makes no arrays of its own."""
+    """Compile a function that only kernels call and that makes no arrays of its own."""
     return _once(function, _nrt=False, no_cpython_wrapper=True)
 
 
@@ -80,20 +80,20 @@ def inlined(function: F) -> F:
     """Compile a small step that makes no arrays, once, and copy it into its callers.
 
     The optimizer copies it, after types are known: Numba's own copies are typed again in each
-    caller, which took a quarter of the time of compilation.
+    caller, which took a quarter of the compilation time.
     """
     return _once(function, _nrt=False, no_cpython_wrapper=True, forceinline=True)
 
 
 def templated(function: F) -> F:
-    """Copy a small step into its callers before types are known: for arguments of any types."""
+    """Copy a small step into its callers before types are known, for arguments of any types."""
     return cast(F, numba.njit(nogil=True, inline="always")(function))
 
 
 def _once(function: F, **options: bool) -> F:
-    """Compile a function for one signature, in one of the processes that ask for it.
+    """Compile a function once per signature, in only one of the processes that need it.
 
-    Numba compiles anew for the literal 0, an int32 and an int64; here all are int64.
+    Numba compiles separately for the literal 0, an int32 and an int64; here all are int64.
     """
     all_options: dict[str, Any] = {"no_cfunc_wrapper": True, "nogil": True, **options}
     dispatcher: Any = numba.njit(**all_options)(function)
@@ -123,9 +123,9 @@ def _is_for_kernels(dispatcher: Any) -> bool:
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Collect no garbage: a compiler makes little but many objects, a tenth of its time.
+    """Switch off garbage collection: a compiler makes many objects and little garbage.
 
-    Who holds the compiler's lock may call it again.
+    Collection took a tenth of its time. May be nested by the holder of the compiler's lock.
     """
     was_enabled = gc.isenabled()
     gc.disable()
@@ -137,6 +137,6 @@ def _no_collection() -> Iterator[None]:
 
 
 def _widest(kind: Any) -> Any:
-    """Return the one type that stands for a scalar of this one."""
+    """Return the type as which a scalar of this type is compiled."""
     kind = types.unliteral(kind)
     return types.int64 if isinstance(kind, types.Integer) and kind != types.uint64 else kind

@@ -1,10 +1,10 @@
-"""Compiled kernels on disk: each is valid as long as it and all it calls are as they were.
+"""Compiled kernels on disk: each is valid as long as it and all it calls are unchanged.
 
-Numba looks only at the file of a kernel to tell whether what it compiled is stale, not at the files
-of the kernels that were compiled into it, and files it under the absolute path of the sources.
-Here a kernel's stamp covers its own code, the code of the kernels it calls, and the values of the
-globals they read: an edit compiles anew what it reaches and nothing else, and the folder of
-kernels may be copied with the sources.
+To tell whether compiled code is stale, Numba looks only at the file of the kernel, not at those of
+the kernels compiled into it, and it stores it by the absolute path of the sources. Here a kernel's
+stamp covers its own code, the code of the kernels it calls, and the values of the globals they
+read: an edit recompiles only what it affects, and the folder of kernels may be copied with the
+sources.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from planner_core.sources import PACKAGE, fingerprint
 try:
     import fcntl
 except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]  # asked for before use
+    fcntl = None  # type: ignore[assignment]  # checked before use
 
 _HOW_KERNELS_ARE_CALLED: Final = ("bundles.py", "jit.py", "kernel_cache.py")
 
 
 class SharedCache(FunctionCache):
-    """The versions of one kernel on disk; where one is missing, the first process compiles it.
+    """The versions of one kernel on disk; if one is missing, the first process compiles it.
 
     Parameters
     ----------
     dispatcher
-        Numba's, as it is made: its kernel's stamp is taken when it is first called, once all that
-        it calls is defined.
+        Numba's dispatcher when just made: the kernel's stamp is taken at its first call, when all
+        that it calls is defined.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -55,7 +55,7 @@ class SharedCache(FunctionCache):
         self._file: IO[bytes] | None = None
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Return the compiled kernel; None where the caller is to compile it."""
+        """Return the compiled kernel; None if the caller has to compile it."""
         self._take_stamp()
         found = super().load_overload(signature, target_context)
         if found is None and self._wait():
@@ -63,12 +63,12 @@ class SharedCache(FunctionCache):
         return found
 
     def signatures(self) -> list[Any]:
-        """Return with which arguments the kernel is on disk, as Numba's types."""
+        """Return the signatures for which the kernel is on disk, as Numba's types."""
         self._take_stamp()
         return [signature for signature, *_ in self._cache_file._load_index()]
 
     def let_others(self) -> None:
-        """Let processes go on that wait for this kernel."""
+        """Let processes that wait for this kernel continue."""
         if self._file is not None and self._lock is not None:
             self._lock.unlink(missing_ok=True)
             self._file.close()
@@ -79,7 +79,7 @@ class SharedCache(FunctionCache):
             self._cache_file._source_stamp = stamp(self._dispatcher)
 
     def _wait(self) -> bool:
-        """Wait until nobody else compiles the kernel; return whether somebody may have."""
+        """Wait until no other process compiles the kernel; return whether one may have done so."""
         if fcntl is None or self._file is not None:
             return False
         self._lock = Path(self.cache_path) / f"{self._py_func.__qualname__}.lock"
@@ -93,7 +93,7 @@ class SharedCache(FunctionCache):
 
 
 class _Index(IndexDataCacheFile):
-    """Which versions of a kernel there are: none that were compiled for a class that is gone."""
+    """The index of a kernel's versions; it counts as empty if it names a class that is gone."""
 
     def _load_index(self) -> dict[Any, str]:
         try:
@@ -104,11 +104,11 @@ class _Index(IndexDataCacheFile):
 
 
 class _Locator(_CacheLocator):
-    """Where a kernel's files are: by the name of its module."""
+    """The location of a kernel's files, which depends on the name of its module."""
 
     def __init__(self, function: Callable[..., object]) -> None:
         self._module = function.__module__
-        self._py_file = inspect.getfile(function)  # asked for where Numba cannot keep a kernel
+        self._py_file = inspect.getfile(function)  # read if Numba cannot store a kernel
 
     @classmethod
     def from_function(cls, py_func: Callable[..., object], _: str) -> _Locator:
@@ -121,7 +121,7 @@ class _Locator(_CacheLocator):
         """Return nothing yet: what the kernel calls may be defined below it."""
 
     def get_disambiguator(self) -> str:
-        return "0"  # the names of a module's kernels differ
+        return "0"  # kernels of a module have different names
 
 
 class _Files(CompileResultCacheImpl):
@@ -138,12 +138,12 @@ SharedCache._impl_class = _Files
 
 
 def stamp(dispatcher: Any) -> str:
-    """Return a hash of all that decides what a kernel is compiled to.
+    """Return a hash of all that decides the compiled code of a kernel.
 
     Parameters
     ----------
     dispatcher
-        Numba's, of the kernel.
+        Numba's dispatcher of the kernel.
     """
     digest = hashlib.sha256(_how_kernels_are_called().encode())
     seen: set[int] = set()
@@ -173,7 +173,7 @@ def _is_dispatcher(value: object) -> bool:
 
 
 def _code(function: FunctionType) -> list[tuple[object, ...]]:
-    """Return what the function and those inside it do; not where they stand in their file."""
+    """Return the code of the function and those inside it, but not their lines in the file."""
     return [
         (each.co_code, each.co_names, each.co_varnames, _constants(each), each.co_exceptiontable)
         for each in _codes(function.__code__)
@@ -192,7 +192,7 @@ def _constants(code: CodeType) -> list[str]:
 def _globals(function: FunctionType) -> list[tuple[str, object]]:
     """Return the globals that the function reads, by name.
 
-    Attributes go by names too: some of these may be read by nobody.
+    The names include those of attributes, so some of these globals may not be read at all.
     """
     names = {name for code in _codes(function.__code__) for name in code.co_names}
     closure = inspect.getclosurevars(function).nonlocals
@@ -201,7 +201,7 @@ def _globals(function: FunctionType) -> list[tuple[str, object]]:
 
 
 def _told(value: Any) -> object:
-    """Return what the compiler takes from a global."""
+    """Return what the compiled code depends on in a global."""
     if _is_dispatcher(value):
         return f"{value.py_func.__module__}.{value.py_func.__qualname__}"
     if isinstance(value, type) and issubclass(value, enum.Enum):

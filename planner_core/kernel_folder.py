@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, told without the compiler."""
+"""The folder of compiled kernels, found without importing the compiler."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def kernel_folder() -> Path:
     beside = PACKAGE / "__pycache__"
     if os.access(beside if beside.is_dir() else PACKAGE, os.W_OK):
         return beside / "kernels"
-    # Of another version of the package, which shares that folder, nothing is of use.
+    # Other versions of the package share the parent folder; their kernels are of no use here.
     version = fingerprint(PACKAGE, PACKAGE.rglob("*.py"))
     folder = platformdirs.user_cache_path("slewline") / f"kernels-{version}"
     _bring_along(beside / "kernels", folder)
@@ -30,9 +30,9 @@ def kernel_folder() -> Path:
 
 
 def _bring_along(installed: Path, folder: Path) -> None:
-    """Copy the kernels of an installation that is read-only: Numba reads only where it can write.
+    """Copy the kernels of a read-only installation: Numba reads only from where it can write.
 
-    What was compiled for another processor is compiled again into the copy.
+    Kernels compiled for another processor are compiled again into the copy.
     """
     if folder.exists() or not installed.is_dir():
         return

@@ -1,4 +1,4 @@
-"""What is nearly always a mistake in a question that can be planned all the same."""
+"""Warnings of what is nearly always a mistake in a scenario, although it can be planned."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _MUCH_AT_SEA = 0.4
 _SWAPPED_ON_LAND = 0.8
 _MOST_AT_SEA = 0.8
 _MU_M3_S2 = 3.986004418e14
-# Osculating radii and geodetic nadirs differ from mean and geocentric ones by less.
+# More than osculating radii and geodetic nadirs differ from mean and geocentric ones.
 _SPARE_RAD = math.radians(1.0)
 
 
 def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
-    """Return sentences about a question, before anything of it is worked out."""
+    """Return warnings about a scenario, before anything of it is computed."""
     found = (
         _at_sea(scenario),
         _at_night(scenario),
@@ -36,7 +36,7 @@ def usual_mistakes(scenario: Scenario) -> tuple[str, ...]:
 
 
 def mistakes_of_accesses(scenario: Scenario, table: Opportunities) -> tuple[str, ...]:
-    """Return sentences about what satellites see of a question's targets and stations."""
+    """Return warnings about when satellites see a scenario's targets and stations."""
     if not (scenario.use_resources and scenario.ground_stations):
         return ()
     if not (table.kind == CONTACT).any():
@@ -46,10 +46,10 @@ def mistakes_of_accesses(scenario: Scenario, table: Opportunities) -> tuple[str,
 
 
 def _more_than_contacts_take(scenario: Scenario, table: Opportunities) -> str | None:
-    """Warn where one image of each target in sight is more than all contacts together take down.
+    """Warn if one image of each target in sight is more than all contacts together take down.
 
-    Each is as small as it can be, each contact at its satellite's highest rate, and none in the way
-    of another: it is more than they take whatever is planned.
+    Images count as small as they can be and contacts at their satellite's highest rate, without
+    conflicts. So if there is a warning, it is true whatever is planned.
     """
     capacities = [s.resources.recorder_capacity_mbit for s in scenario.satellites]
     known = np.array([1.0 if one is None else one for one in capacities])
@@ -81,7 +81,7 @@ def _more_than_contacts_take(scenario: Scenario, table: Opportunities) -> str | 
 
 
 def _at_sea(scenario: Scenario) -> str | None:
-    """Warn where most targets are at sea, and say where swapping their angles would help.
+    """Warn if most targets are at sea, and say if swapping latitude and longitude would help.
 
     Targets drawn over the whole globe are no mistake: seven of ten are at sea.
     """
@@ -108,9 +108,9 @@ def _at_sea(scenario: Scenario) -> str | None:
 
 
 def _at_night(scenario: Scenario) -> str | None:
-    """Warn where neither sensor nor target nor quality minds the sun, and the sensor is no radar.
+    """Warn if neither sensor nor target nor quality limits sun elevation, and there is no radar.
 
-    The paper's presets know no light, on purpose.
+    The paper's presets deliberately ignore light: they have no recorder capacity in megabits.
     """
     blind = [s for s in scenario.satellites if not _minds_the_sun(s)]
     dark = sum(target.sun_elevation_min_deg is None for target in scenario.targets)
@@ -194,10 +194,10 @@ def _too_long(scenario: Scenario) -> str | None:
 
 
 def _longest_access_s(satellite: Satellite) -> float:
-    """Return a time that no access exceeds: from one edge of what is seen to the other.
+    """Return a time that no access exceeds: the passage from one edge of the view to the other.
 
-    The satellite is nowhere farther than at its apogee, and nowhere slower; a site on the ground
-    runs along with it at the Earth's rotation at most.
+    The satellite is farthest and slowest at its apogee, and a site on the ground moves along with
+    it no faster than the Earth rotates.
     """
     rate_rad_s = 2.0 * math.pi / satellite.orbit.period_s
     axis_m = math.cbrt(_MU_M3_S2 / rate_rad_s**2)

@@ -1,7 +1,7 @@
 """What a scenario pins: actions that must be kept, and what is ruled out.
 
-Pins are written in the operator's words: names and instants, never the planner's numbers
-(``planner_core.pinning.pinned_problem`` turns one into the other).
+Pins use the operator's names and instants, not the planner's indices
+(``planner_core.pinning.pinned_problem`` translates them).
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ PinnedMode = Literal["collect", "contact"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PinnedAction:
-    """An action in words: a booked contact, a promised image.
+    """An action by names: a booked contact, a promised image.
 
     Attributes
     ----------
     target_id, station_id, satellite_id
-        What is imaged or contacted, and by whom; exactly one of the first two, unless
-        ``opportunity_id`` says it all.
+        What is imaged or contacted, and by which satellite; exactly one of the first two, unless
+        ``opportunity_id`` is given.
     start, end
-        When. Of the opportunities that these instants touch, the one that starts nearest to
-        ``start`` is meant. They may be left out where there is only one.
+        When. Among the opportunities that overlap this span, the one that starts nearest to
+        ``start`` is meant. They may be left out if there is only one.
     opportunity_id
         The opportunity itself (``o17``), as the scenario lists it.
     """
@@ -42,7 +42,7 @@ class PinnedAction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockedInterval:
-    """A span in which a satellite may not image, not contact, or neither."""
+    """A span in which a satellite may not image, may not contact stations, or both."""
 
     satellite_id: str
     start: datetime
@@ -57,7 +57,7 @@ class Pins:
     Attributes
     ----------
     keep, skip
-        Actions that every plan must hold, and single ones that none may.
+        Actions that every plan must hold, and single actions that none may hold.
     block
         Spans in which a satellite may not act.
     forbid
@@ -85,7 +85,7 @@ class Pins:
         Raises
         ------
         InvalidScenario
-            With a pointer into ``/pins``.
+            A pin is invalid; with a pointer into ``/pins``.
         """
         actions = [(f"/pins/keep/{i}", action) for i, action in enumerate(self.keep)]
         actions += [(f"/pins/skip/{i}", action) for i, action in enumerate(self.skip)]

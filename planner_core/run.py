@@ -32,8 +32,8 @@ from planner_core.solvers.base import Solution, Solver
 
 log = logging.getLogger(__name__)
 
-_SEARCH: Final = 0.8  # of the time: the rest brings images down and does what is preferred
-_ROUNDING: Final = 1e-6  # relative; rewards to which bounds are stated
+_SEARCH: Final = 0.8  # of the time; the rest adds downlinks and follows preferences
+_ROUNDING: Final = 1e-6  # relative tolerance for comparing rewards with bounds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,16 +48,16 @@ class Runtime:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Judged:
-    """A solver's answer with everything that the referee has to say of it.
+    """A solver's solution with the referee's verdict, the bound and the reasons.
 
     Attributes
     ----------
     bound
-        None where this plan has refuted all there were.
+        None if this plan has refuted all bounds.
     outcomes
-        Every target once, in the scenario's order.
+        The outcome of each target, in the scenario's order.
     effects
-        What preferences came to, in their order.
+        The effect on each preference, in their order.
     """
 
     scenario: Scenario
@@ -85,19 +85,18 @@ def plan_scenario(
     Parameters
     ----------
     computed, known_bound
-        What earlier plans of the same scenario have found out already. The plan itself does
-        not depend on it.
+        Results of earlier plans of the same scenario. The plan itself does not depend on them.
     before
-        Of a replan: what the search for the plan before has worked out. It spares access, and
-        where its multipliers still prove enough the search for a proof.
+        For a replan, what the search for the previous plan has found out. It saves computing
+        access and, if its multipliers still prove enough, the search for a proof.
 
     Raises
     ------
     PropagationFailed
-        Where SGP4 cannot carry an orbit through the horizon.
+        SGP4 cannot propagate an orbit through the horizon.
     Cancelled
-        Where somebody cancelled before there was a problem to plan. A budget that ended before
-        there was one has the search answer with the first plan that it finds.
+        Somebody cancels before the problem is built. If only the time ends before that, the
+        search returns the first plan that it finds.
     """
     clock = [time.perf_counter()]
     preparation = budget.until_cancelled()
@@ -111,7 +110,7 @@ def plan_scenario(
     clock.append(time.perf_counter())
     budget.report(Progress(phase="verify", fraction=0.0))
     timeline = replay(problem, solution.plan)
-    # A replan has asked the multipliers of the plan before, or has begun with a quick bound.
+    # A replan has used the previous plan's multipliers, or has begun with a quick bound.
     has_asked = scenario.replan is not None or solver.bounds or _is_settled(problem, solution)
     bound = _best_bound(
         relieved, solution, timeline, budget, known_bound,
@@ -154,7 +153,7 @@ def plan_scenario(
 def _opportunities(
     scenario: Scenario, before: PlanBefore | None, budget: Budget
 ) -> ScenarioOpportunities:
-    """Return the opportunities of the plan before, where they still hold, or compute them."""
+    """Return the opportunities, taken from the previous plan as far as they still hold."""
     kept = before.opportunities_of(scenario, budget) if before is not None else None
     return kept or compute_opportunities(scenario, budget)
 
@@ -167,13 +166,13 @@ def _search(
     seed: int,
     before: PlanBefore | None,
 ) -> tuple[Problem, Solution, tuple[Effect, ...]]:
-    """Return what was searched, the plan as it is to be flown, and what preferences cost."""
+    """Return the problem that was searched, the plan to fly, and the effects of preferences."""
     own = without_on_board(problem)
     relieved = within_limits(own)
-    # A replan changes as little as it must; nothing else may ask for more changes.
+    # A replan changes as little as possible, so preferences are not followed.
     aims = scenario.objective.prefer if scenario.replan is None else ()
     if scenario.replan is None:
-        # Solvers of the paper leave it to what follows to bring images down.
+        # The paper's solvers rely on a later step to downlink images.
         is_followed = bool(aims) or (problem.counts_delivery and not solver.bounds)
         search = budget.part(_SEARCH) if is_followed else budget
         found = solver.solve(relieved, search, seed)
@@ -197,7 +196,7 @@ def _search(
 
 
 def _is_settled(problem: Problem, solution: Solution) -> bool:
-    """Return whether multipliers that a search has settled on prove more than those of a moment."""
+    """Return whether the search's converged multipliers prove more than a quick bound can."""
     is_lagrangian = solution.proven is not None and solution.proven.proof == "lagrangian"
     return is_lagrangian and not problem.use_resources
 
@@ -211,11 +210,11 @@ def _best_bound(
     *,
     wants_quick: bool,
 ) -> Bound | None:
-    """Return the lowest of what is known, what the solver has proven and a quick bound if wanted.
+    """Return the lowest of the known bound, the solver's and, if wanted, a quick one.
 
-    Each of them is of what new images earn. A plan that may not be flown can earn more than any
-    that may: no bound is below its reward.
-    A valid plan that does shows a fault in the bound, which is then not repeated.
+    All of them bound what new images earn. An invalid plan can earn more than any valid one; the
+    bound is then raised to its reward. A valid plan that earns more than a bound shows that the
+    bound is wrong, and it is dropped.
     """
     reward = timeline.earned_by_new
     known = known and known.without_on_board()
@@ -234,7 +233,7 @@ def _best_bound(
 def _quick_bound(problem: Problem, reward: float, budget: Budget) -> Bound:
     if problem.continuous_starts:
         return continuous.quick_bound(problem)
-    # Someone who cancels wants the answer now: multipliers stay rough then.
+    # Whoever cancels wants the answer now, so multipliers stay rough.
     return (
         lagrangian_bound(problem, reward, 0)
         if budget.is_cancelled
@@ -243,19 +242,19 @@ def _quick_bound(problem: Problem, reward: float, budget: Budget) -> Bound:
 
 
 def _is_met(bound: Bound | None, timeline: Timeline) -> bool:
-    """Return whether a plan earns all that is proven, to rounding."""
+    """Return whether a plan reaches the bound, up to rounding."""
     return bound is not None and timeline.reward >= bound.value * (1.0 - _ROUNDING)
 
 
 def _of_all(bound: Bound, timeline: Timeline) -> Bound | None:
-    """Return the bound of new images and those on board; None if it is below a valid plan."""
+    """Return the bound on new images and those on board; None if a valid plan exceeds it."""
     if _is_beaten(bound, timeline, timeline.reward):
         return None
     return replace(bound, value=max(bound.value, timeline.reward))
 
 
 def _is_beaten(bound: Bound, timeline: Timeline, reward: float) -> bool:
-    """Return whether a valid plan earns more than the bound allows, and say so if it does."""
+    """Return whether a valid plan earns more than the bound allows; log an error if it does."""
     allowed = bound.value + _ROUNDING * max(1.0, abs(bound.value))
     is_beaten = timeline.is_valid and reward > allowed
     if is_beaten:

@@ -1,4 +1,4 @@
-"""Sorting and searching in kernels: NumPy's own take seconds to compile for each type."""
+"""Sorting and searching in kernels; NumPy's functions take seconds to compile for each type."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def stable_order(keys: Floats) -> Longs:
 
 @borrowing_inner
 def first_not_below(values: Floats, least: float) -> int:
-    """Return the place of the first value that is ``least`` or more, of some in rising order.
+    """Return the index of the first of some ascending values that is ``least`` or more.
 
     Examples
     --------

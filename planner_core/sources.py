@@ -1,4 +1,4 @@
-"""Fingerprints of the core's own sources: what was stored by other code is made anew."""
+"""Fingerprints of the core's own sources, so that results stored by other code are recomputed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WHAT_MAKES_OPPORTUNITIES: Final = ("domain", "access", "data", "orbits", "probl
 
 
 def fingerprint(package: Path, paths: Iterable[Path]) -> str:
-    """Return a hash of files and of where they lie in their package."""
+    """Return a hash of files and of their paths in the package."""
     digest = hashlib.sha256()
     for path in sorted(paths):
         digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
@@ -32,5 +32,5 @@ def opportunity_sources(package: Path = PACKAGE) -> tuple[Path, ...]:
 
 @cache
 def opportunity_version() -> str:
-    """Return what changes whenever opportunities or their stored form may have changed."""
+    """Return a version that changes whenever opportunities or their stored form may change."""
     return fingerprint(PACKAGE, opportunity_sources())

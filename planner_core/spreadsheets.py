@@ -1,11 +1,11 @@
-"""Texts in CSV files, which spreadsheets run where they begin like a formula."""
+"""Texts in CSV files: spreadsheets execute them if they begin like a formula."""
 
 from __future__ import annotations
 
 import re
 from typing import Final
 
-# Excel takes the wide forms of East Asian keyboards as well.
+# Excel also accepts the full-width forms of East Asian keyboards.
 _RISKY: Final = re.compile(r"'*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20]")
 
 

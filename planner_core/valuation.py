@@ -1,6 +1,6 @@
 """What the opportunities of a scenario are worth.
 
-Apart from geometry: weather and rewards change, stored opportunities do not.
+This is kept apart from geometry: weather and rewards change, stored opportunities do not.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ Floats = npt.NDArray[np.float64]
 
 
 def worth_of_opportunities(scenario: Scenario, table: Opportunities) -> Floats:
-    """Return what each opportunity earns alone; contacts nothing.
+    """Return what each opportunity earns alone; contacts earn nothing.
 
     With continuous starts the sky is that of the opportunity, wherever in its access the collect
-    begins: it hardly changes in minutes, and bounds hold.
+    begins: it hardly changes within minutes, and bounds stay valid.
     """
     target_reward = np.array([target.reward for target in scenario.targets], dtype=np.float64)
     collects = np.flatnonzero(table.kind == COLLECT)
@@ -44,7 +44,7 @@ def worth_of_opportunities(scenario: Scenario, table: Opportunities) -> Floats:
 
 
 def clear_probabilities(scenario: Scenario, table: Opportunities, collects: Longs) -> Floats:
-    """Return how likely the sky is clear at the middle of some collects of a table."""
+    """Return the probability of a clear sky at the middle of some collects of a table."""
     middle_s = 0.5 * (table.start_s[collects] + table.end_s[collects])
     return clear_probability_of(
         scenario.forecast, table.site[collects], middle_s, len(scenario.targets)

@@ -1,19 +1,19 @@
-r"""What images earn: the one place that says so.
+r"""What images earn; no other module defines it.
 
 A target earns :math:`W_i(S)` from the images :math:`S` that a plan takes of it. Today every target
 is of the kind *once*: it earns the best worth of its images, :math:`W_i(S) = \max_{o \in S} v_o`,
-and a second image adds what it is better by. Each collect has its own :math:`v_o`, the reward of
-the target when the collect starts, times the quality of the image and the probability that the sky
-is clear, and of that the part that the objective lets it earn (``share_earned``). Which part that
-is hangs on the whole plan where delivery counts: solvers and bounds go by the most that it can be,
-the referee by what it is.
+so a better second image adds the difference. The worth :math:`v_o` of a collect is the reward of
+the target when the collect starts, times the quality of the image, the probability that the sky is
+clear, and the share that the objective lets it earn (``share_earned``). If delivery counts, that
+share depends on the whole plan: solvers and bounds use the most that it can be, the referee the
+actual one.
 
-Bounds multiplier targets. At a multiplier :math:`\lambda_i \ge 0` a path is paid
+Bounds assign a multiplier :math:`\lambda_i \ge 0` to each target. A path is then paid
 :math:`w_o = \max(0, v_o - \lambda_i)` for a collect, and the target keeps its *surplus*
 :math:`\max_S W_i(S) - \sum_{o \in S} w_o`, which is :math:`\lambda_i` up to the best worth of its
-collects. For any multipliers no plan earns more than all surpluses and, for each satellite, its
-heaviest path. Another kind of target is another :math:`W_i` with its own weights and surplus: the
-functions here are what it would have to answer.
+collects. For any multipliers no plan earns more than the sum of all surpluses and of each
+satellite's heaviest path. Another kind of target would have another :math:`W_i` with its own
+weights and surplus, which the functions here would have to provide.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _MOST_WHOLE: Final = 2.0**50  # from here on amounts are not counted in whole un
 def quality_of(
     quality: Quality, off_nadir_deg: npt.NDArray[Any], sun_elevation_deg: npt.NDArray[Any]
 ) -> Floats:
-    """Return how good images are that are taken at these angles, from 0 to 1.
+    """Return the quality, from 0 to 1, of images taken at these angles.
 
     >>> curves = Quality(off_nadir_deg=((0.0, 1.0), (40.0, 0.6)))
     >>> quality_of(curves, np.array([10.0, 50.0]), np.zeros(2))
@@ -54,12 +54,12 @@ def quality_of(
 def clear_probability_of(
     forecast: Forecast | None, target: _Indices, at_s: Floats, num_targets: int
 ) -> Floats:
-    """Return how likely the sky over targets is clear; 1 without a forecast.
+    """Return the probability of a clear sky over targets; 1 without a forecast.
 
     Parameters
     ----------
     target, at_s
-        Of each image, which target and when. Shape ``(n,)``.
+        Target and instant of each image. Shape ``(n,)``.
     """
     if forecast is None:
         return np.ones(len(target))
@@ -70,7 +70,7 @@ def clear_probability_of(
     for number, one in enumerate(forecast.series):
         series[one.target] = number
         own_row[one.target] = np.arange(len(one.target))
-    # Vendors' files may have as many series as targets: each is asked for its own images alone.
+    # Vendors' files may have as many series as targets: evaluate each for its own images only.
     order = np.argsort(series[target], kind="stable")
     cuts = np.searchsorted(series[target][order], np.arange(len(forecast.series) + 1))
     for one, first, last in zip(forecast.series, cuts[:-1], cuts[1:], strict=True):
@@ -81,7 +81,7 @@ def clear_probability_of(
 
 
 def _between(series: SkySeries, row: _Indices, at_s: Floats) -> Floats:
-    """Return the values of rows of a series at instants that it covers."""
+    """Return the values in rows of a series at instants that it covers."""
     time_s, values = series.time_s, series.clear_probability
     if len(time_s) == 1:
         return values[row, np.zeros(len(row), dtype=np.int64)]
@@ -103,12 +103,12 @@ def urgency_of(waited_s: Floats, half_life_s: Floats) -> Floats:
 def worth_of_collects(
     target_reward: Floats, target: _Indices, urgency: Floats, quality: Floats, clear: Floats
 ) -> Floats:
-    """Return what each collect earns alone: its target's reward times all that lessens it."""
+    """Return what each collect earns alone: its target's reward times all reducing factors."""
     return target_reward[target] * urgency * quality * clear
 
 
 def share_earned(objective: Objective, age_s: Floats) -> Floats:
-    """Return which part of its worth an image earns that is on the ground at this age.
+    """Return the share of its worth that an image earns if it is on the ground at this age.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def share_earned(objective: Objective, age_s: Floats) -> Floats:
 
 
 def delivery_share(objective: Objective, age_s: Floats) -> Floats:
-    """Return which part of its worth an image earns by being on the ground at this age.
+    """Return the share of its worth that an image earns for its delivery at this age.
 
     >>> delivery_share(Objective(collected_share=0.5), np.array([3600.0, np.inf]))
     array([0.5, 0. ])
@@ -136,12 +136,12 @@ def delivery_share(objective: Objective, age_s: Floats) -> Floats:
 
 
 def best_worths(target: _Indices, worth: Floats, num_targets: int) -> Floats:
-    """Return the most that one of these images of each target earns; 0 where there is none.
+    """Return the most that one of these images of each target earns; 0 if there is none.
 
     Parameters
     ----------
     target, worth
-        Of each image. Shape ``(n,)``.
+        Target and worth of each image. Shape ``(n,)``.
 
     Returns
     -------
@@ -153,9 +153,9 @@ def best_worths(target: _Indices, worth: Floats, num_targets: int) -> Floats:
 
 
 def worth_of(target: _Indices, worth: Floats) -> float:
-    """Return what a set of images earns: each target the best of its own.
+    """Return what a set of images earns: the best image of each target counts.
 
-    The sum is rounded once, so it does not hang on the order of the images.
+    The sum is rounded once, so it does not depend on the order of the images.
     """
     if len(target) == 0:
         return 0.0
@@ -163,12 +163,12 @@ def worth_of(target: _Indices, worth: Floats) -> float:
 
 
 def gain(worth: float, others: Floats) -> float:
-    """Return what an image adds to others of the same target."""
+    """Return what an image adds to what others of the same target earn."""
     return max(0.0, worth - float(others.max(initial=0.0)))
 
 
 def weights(worth: Floats, multiplier: Floats) -> Floats:
-    """Return what paths are paid for images, at the multiplier of each one's target."""
+    """Return what paths are paid for images, given the multiplier of each image's target."""
     return np.maximum(worth - multiplier, 0.0)
 
 
@@ -178,9 +178,9 @@ def surplus(multiplier: Floats, best_worth: Floats) -> Floats:
 
 
 def common_unit(worth: Floats) -> float:
-    """Return an amount of which whatever these images earn is a multiple; 0 for none.
+    """Return an amount of which any reward from these images is a multiple; 0 for none.
 
-    Whole rewards without quality have one, and bounds are rounded down to it.
+    Whole rewards without quality have one; bounds are rounded down to its multiples.
 
     >>> common_unit(np.array([4.0, 0.0, 6.0])), common_unit(np.array([0.5, 1.0]))
     (2.0, 0.0)

@@ -114,7 +114,7 @@ def _of_age(view: View) -> Floats:
 
 
 def _of_drain(view: View) -> Floats:
-    """Return -1 for tasks that drain the lowest battery since it was last full, 0 for others."""
+    """Return -1 for tasks between the last full level of the lowest battery and its minimum."""
     table = view.problem.opportunities
     liking = np.zeros(len(table))
     lines = view.curves
