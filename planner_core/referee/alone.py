@@ -1,7 +1,7 @@
 """The referee's verdict on one satellite's actions, which does not depend on the other satellites.
 
-Between successive plans of a search only some satellites change, so verdicts are remembered: for
-the README's fleet, four in ten were judged before.
+Between successive plans of a search only a few satellites change, so verdicts are remembered: for
+the README's fleet, four in ten satellites have been judged before.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ _MOST_TASKS: Final = 10_000  # a first day takes 0.2 s for 2,500 opportunities, 
 
 
 def has_days(problem: Problem) -> bool:
-    """Return whether resources count and no image's worth halves until it is on the ground."""
+    """Return whether resources count and the worth of images does not depend on their age."""
     has_half_life = problem.counts_delivery and problem.objective.half_life_s is not None
     return problem.use_resources and not has_half_life
 
