@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
+from service.wire.satellites import PresetResourcesIn
+
 Json = dict[str, Any]
 BuiltIn = Literal["generic_optical", "generic_sar", "paper", "paper_code"]
 
@@ -116,7 +118,8 @@ def type_named_by(given: Mapping[str, Any]) -> str:
 def filled(given: Mapping[str, Any], kind: Mapping[str, Any]) -> Json:
     """Return a body with missing settings taken from a type, one by one.
 
-    A body's resources replace those of the type as a whole if either is a preset.
+    Resources that are a preset replace those of the type. Over a type that is a preset, a body may
+    change what a preset lets change; other figures need all resources, since it has no watt-hours.
     Without an acceleration, slews go from rest to rest unless the body says otherwise.
     """
     agility = {**kind["agility"], **_part(given, "agility")}
@@ -124,8 +127,10 @@ def filled(given: Mapping[str, Any], kind: Mapping[str, Any]) -> Json:
         agility.pop("slew_model", None)
     own, base = given.get("resources"), kind["resources"]
     resources: Any = base if own is None else own
-    if isinstance(own, Mapping) and "preset" not in own and isinstance(base, Mapping):
-        resources = {**base, **own}
+    if isinstance(own, Mapping) and "preset" not in own:
+        whole = {"preset": base} if isinstance(base, str) else base
+        if "preset" not in whole or own.keys() <= PresetResourcesIn.model_fields.keys():
+            resources = {**whole, **own}
     return {
         **given,
         "agility": agility,

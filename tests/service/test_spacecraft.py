@@ -67,6 +67,7 @@ OVERRIDES: list[dict[str, Any]] = [
     {"sensor": {"sun_elevation_min_deg": None}, "resources": {"battery_capacity_wh": 90.0}},
     {"resources": "paper_code", "agility": {"slew_rate_deg_s": 2.0}},
     {"resources": {"preset": "paper", "sun_pointing": "slew"}},
+    {"spacecraft": "paper_code", "resources": {"recorder_max_fraction": 0.6}},
 ]
 
 
@@ -96,6 +97,21 @@ def test_what_a_body_says_comes_before_its_type() -> None:
     assert not isinstance(resources, str)
     assert resources.model_dump()["idle_power_w"] == 5.0
     assert resources.model_dump()["battery_capacity_wh"] == 500.0
+
+
+@pytest.mark.parametrize(
+    "kind", ["paper_code", {"preset": "paper_code", "battery_min_fraction": 0.4}]
+)
+def test_a_type_that_is_a_preset_is_overridden_field_by_field(kind: object) -> None:
+    base = {**BUILT_IN["paper_code"], "resources": kind}
+    whole = filled({"resources": {"initial_battery_fraction": 0.5}}, base)
+    known = {} if isinstance(kind, str) else {"battery_min_fraction": 0.4}
+    assert whole["resources"] == {
+        "preset": "paper_code", "initial_battery_fraction": 0.5, **known
+    }  # fmt: skip
+    WholeSatellite.model_validate(bare() | whole)
+    in_watts = {"battery_capacity_wh": 90.0}
+    assert filled({"resources": in_watts}, base)["resources"] == in_watts
 
 
 def test_an_unknown_type_in_a_file_is_named() -> None:
