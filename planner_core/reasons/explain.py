@@ -46,7 +46,7 @@ from planner_core.reasons.reason import (
     Search,
     TargetOutcome,
 )
-from planner_core.reasons.teller import Teller
+from planner_core.reasons.reason_text import ReasonRenderer
 from planner_core.referee.timeline import Timeline
 from planner_core.worth import gain
 
@@ -236,11 +236,11 @@ def _forced_reasons(
         forced = Forced._make(column[picked] for column in tried.forced)
         rows = problem.local_row[tried.rows[picked]]
         displaced = displace_each(one, rows, forced)
-        teller = Teller(problem, one, forced, displaced, search)
+        renderer = ReasonRenderer(problem, one, forced, displaced, search)
         for c, at in enumerate(own):
             target = int(targets[at])
             row = int(tried.rows[picked[c]])
-            reasons[target] = teller.reason(c, target, row, changes.smallest(int(at)))
+            reasons[target] = renderer.reason(c, target, row, changes.smallest(int(at)))
     return reasons
 
 

@@ -31,7 +31,7 @@ _LIMITS: Final[dict[int, Literal["battery", "recorder"]]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=False, eq=False)
-class Teller:
+class ReasonRenderer:
     """States as reasons what trials on one satellite have shown."""
 
     problem: Problem
