@@ -1,8 +1,8 @@
-"""Two searches for plans under battery and recorder, by turns.
+"""Two alternating searches for plans under battery and recorder.
 
-The window search finds most in a second. Where it stalls, the exact programmes over choices of
-tasks, each a satellite's whole horizon, lead to other plans that are worth the same: with other
-contacts, and energy left elsewhere.
+The window search finds most of a plan in a second. When it stalls, the exact programmes over
+choices of tasks, each over a satellite's whole horizon, lead to other plans of the same worth: with
+other contacts, and energy left elsewhere.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from planner_core.problem.plan import Plan
 
 
 class AlternatingSearch:
-    """Plans by windows and by choices of tasks, in turn, from one start after another.
+    """Plans by windows and by choices of tasks, alternating, from one start after another.
 
-    The same for the same seed, whatever other searches go on beside it.
+    The same seed gives the same plans, whatever other searches run beside it.
 
     Parameters
     ----------
     start
-        The plan to begin with, and to begin with again where a search leads nowhere, until
-        another is adopted.
+        The plan to begin with, and to restart from when the search stalls, until another is
+        adopted.
     unit
         Of worth, as the exact programmes count it.
 
     Attributes
     ----------
     ended
-        What each start but the last has led to.
+        The final plan of each start but the current one.
     usage
         How many of the plans on the way took each opportunity. Shape ``(n,)``.
     """
@@ -42,10 +42,10 @@ class AlternatingSearch:
     def __init__(self, problem: Problem, start: Plan, unit: float, budget: Budget, seed: int):
         self.problem, self._start, self._budget = problem, start, budget
         self._num_satellites = sum(len(s) > 0 for s in problem.satellites)
-        # Where satellites turn to the sun to charge, tasks come in batches. Dense ones only whole
-        # days move: of 2,000 targets 253 images in place of 251 after 15 s, by four satellites 889
-        # in place of 882. Else some more steps of windows take next to no time beside a day, and
-        # earn up to 2 % more (docs/bounds.md); without such turns fleets lose by them.
+        # If satellites turn to the sun to charge, tasks come in batches. Only replanning whole days
+        # moves dense ones: of 2,000 targets 253 images instead of 251 after 15 s, with four
+        # satellites 889 instead of 882. Otherwise more steps of windows take next to no time beside
+        # a day and earn up to 2 % more (docs/bounds.md); without such turns they cost fleets worth.
         has_batches = problem.turns_to_the_sun
         num_images = np.count_nonzero(problem.opportunities.kind == COLLECT)
         is_dense = has_batches and num_images > self._num_satellites * TUNING.dense
@@ -66,7 +66,7 @@ class AlternatingSearch:
         self.usage = np.zeros(len(problem.opportunities))
 
     def step(self, num_steps: int) -> None:
-        """Let each search go on from where the other got to, or begin afresh where both stall."""
+        """Let each search continue from the other's plan, or restart once both have stalled."""
         for _ in range(num_steps):
             if self._idle_steps == TUNING.patience:
                 self._begin()
@@ -89,11 +89,11 @@ class AlternatingSearch:
         self._note()
 
     def _afresh(self) -> ResourceWindows:
-        # A seed of its own for each start of each search.
+        # Each start of each search has its own seed.
         return ResourceWindows(self.problem, self._seed + MAX_STARTS * self._num_starts)
 
     def adopt(self, plan: Plan) -> None:
-        """Begin with another plan from now on."""
+        """Restart from another plan, now and from now on."""
         self._start, self._idle_steps = plan, TUNING.patience
 
     def _note(self) -> None:
@@ -118,10 +118,10 @@ class AlternatingSearch:
 
     @property
     def plan(self) -> Plan:
-        """The plan as it is now."""
+        """The current plan."""
         return self._windows.plan
 
     @property
     def reward(self) -> float:
-        """What its targets are worth."""
+        """What the plan's targets earn, less the cost of data that stays on board."""
         return self._windows.reward

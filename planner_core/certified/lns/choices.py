@@ -1,9 +1,9 @@
 """Plans under battery and recorder: exact programmes over a choice of tasks for each target.
 
-Where each target may be collected at one time only, none can be collected twice, and the exact
-programme finds the best plan of all those, with contacts and energy spread over the whole
-horizon. The search is for the choice: it opens some targets to all their times, lets the
-programme plan, and settles every target collected twice on one of the two, until there is none.
+If each target has only one task, no target can be collected twice, and the exact programme finds
+the best plan of those tasks, with contacts and energy spread over the whole horizon. The search
+is over which tasks these are: it opens some targets to all their tasks, runs the programme, and
+settles every target collected more than once on one of its tasks, until there is none.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from planner_core.worth import worth_of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SatelliteChoices:
-    """One satellite's programme for plans: strict limits, levels never below what is on board.
+    """One satellite's programme for plans: strict limits, data levels never below the true ones.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class SatelliteChoices:
     weight
         Worth of each task in units. Shape ``(m,)``.
     end_cost
-        What a recorder costs that ends at each level, in units. Shape ``(num_levels,)``.
+        Cost in units of each data level at the end. Shape ``(num_levels,)``.
     """
 
     rows: Ints
@@ -65,7 +65,7 @@ class SatelliteChoices:
         Parameters
         ----------
         worth
-            Of each opportunity, before what its data costs on board. Shape ``(n,)``.
+            Of each opportunity, without the cost of its data staying on board. Shape ``(n,)``.
         """
         satellite = problem.satellites[index]
         network = strict_network_of(problem, satellite)
@@ -79,14 +79,14 @@ class SatelliteChoices:
             levels=levels,
             end_cost=np.minimum(cost, MAX_UNITS).astype(np.int32),
             target=target,
-            # Far above the bound, of which there are at most so many: such a task is in no plan.
+            # The bound counts at most ``max_units``: a task worth more than that is in no plan.
             weight=np.minimum(in_units, TUNING.max_units).astype(np.int32),
         )
 
     def best(self, allowed: Bools, goal: int, stop: Bytes) -> tuple[int, Ints]:
         """Return units and tasks of the best plan of the allowed tasks worth ``goal`` or more.
 
-        Answers -1 and no tasks where there is none. Targets may be collected again and again.
+        Returns -1 and no tasks if there is none. The plan may collect a target several times.
         """
         if self.network.must_deliver:
             allowed = allowed & ((self.target < 0) | self._comes_down(allowed))
@@ -130,22 +130,22 @@ class SatelliteChoices:
         return before
 
     def closings(self) -> Ints:
-        """Return contacts that may be the last of a plan, the latest first."""
+        """Return the last few contacts, latest first: candidates for the last one of a plan."""
         contacts = np.flatnonzero(self.target < 0).astype(np.int32)
         return contacts[::-1][: TUNING.several]
 
 
 class ChoiceSearch:
-    """The best plan so far, by satellite, and moves that better it.
+    """The best plan so far, and moves that replan one satellite after another.
 
     Attributes
     ----------
     taken
         Whether the plan takes each opportunity. Shape ``(n,)``.
     reward
-        What its targets earn, less what data costs that stays on board.
+        What the plan's targets earn, less the cost of data that stays on board.
     usage
-        How many of the plans kept so far took each opportunity. Shape ``(n,)``.
+        How many of the plans accepted so far took each opportunity. Shape ``(n,)``.
     """
 
     def __init__(self, problem: Problem, unit: float, seed: int, stop: Bytes) -> None:
@@ -164,24 +164,24 @@ class ChoiceSearch:
 
     @property
     def plan(self) -> Plan:
-        """The plan that is taken."""
+        """The current plan."""
         return Plan.of(self._problem, np.flatnonzero(self.taken))
 
     def adopt(self, plan: Plan) -> None:
-        """Go on from another plan."""
+        """Continue from another plan."""
         self.taken[:] = False
         self.taken[[action.opportunity for action in plan.actions]] = True
         self.reward = self._worth(self.taken)
 
     def start(self, preferred: Bools, first_goal: float) -> None:
-        """Plan each satellite over what the others leave; keep it if that is better.
+        """Plan each satellite over the targets the others leave; keep the plan if it is no worse.
 
         Parameters
         ----------
         preferred
-            Opportunities that stand for their targets; others offer one at random.
+            Opportunities allowed for their targets; every other target offers one at random.
         first_goal
-            Share of what all of a satellite's targets are worth to try for first.
+            Goal tried first, as a share of what all allowed tasks of a satellite are worth.
         """
         before = self.taken.copy(), self.reward
         self.taken = np.zeros_like(self.taken)
@@ -201,7 +201,7 @@ class ChoiceSearch:
             self.taken, self.reward = before
 
     def _first(self, satellite: SatelliteChoices, allowed: Bools, goal: int) -> tuple[int, Ints]:
-        """Return units and tasks of a plan of allowed tasks, the best over its last contact."""
+        """Return units and tasks of a plan of allowed tasks, the best over a few last contacts."""
         best, path = -1, np.empty(0, dtype=np.int32)
         for closing in satellite.closings() if satellite.network.must_deliver else (None,):
             part, wanted, value = allowed.copy(), goal, -1
@@ -217,7 +217,7 @@ class ChoiceSearch:
         return best, path
 
     def move(self) -> None:
-        """Replan one satellite with some of its targets open; keep what is worth no less."""
+        """Replan one satellite with some of its targets open; keep a plan that is worth no less."""
         index, satellite = self._satellites[self._turn % len(self._satellites)]
         self._turn += 1
         own = self.taken[satellite.rows]
@@ -245,18 +245,18 @@ class ChoiceSearch:
             self.usage += changed
 
     def _settled(self, satellite: SatelliteChoices, allowed: Bools, goal: int) -> tuple[int, Ints]:
-        """Return the plan that is left when each target has been settled on one task."""
+        """Return units and tasks of a plan after settling each target on one task."""
         allowed = allowed.copy()
         num_targets = len(self._problem.target_ids)
         while True:
             value, path = satellite.best(allowed, goal, self._stop)
-            # What must be taken stays, even two images of a target.
+            # Kept tasks stay, even two images of a target.
             is_open = (satellite.target[path] >= 0) & ~satellite.network.is_kept[path]
             images = path[is_open]
             counts = np.bincount(satellite.target[images], minlength=num_targets + 1)
             if value < 0 or counts.max() <= 1:
                 return value, path
-            # Of a target that is collected twice the best counts, any of equal ones.
+            # A target collected more than once keeps its best task, a random one of equals.
             images = self._rng.permutation(images)
             images = images[np.argsort(satellite.weight[images], kind="stable")]
             chosen = np.full(num_targets + 1, -1)
@@ -284,9 +284,9 @@ class ChoiceSearch:
         allowed[(satellite.target < 0) & (blocked == 0)] = True
 
     def _close(self, satellite: SatelliteChoices, allowed: Bools, own: Bools) -> None:
-        """Where images must come down: mostly let the plan end with the contact that it ends with.
+        """If images must be downlinked, mostly keep the last contact of the plan as its last.
 
-        Images offered after it would have to come down, too.
+        Later ones would offer later images, and the last one offered decides how much may be left.
         """
         last = np.flatnonzero(own & (satellite.target < 0))
         if not satellite.network.must_deliver or len(last) == 0:
@@ -297,7 +297,7 @@ class ChoiceSearch:
         allowed[closing + 1 :] &= satellite.target[closing + 1 :] >= 0
 
     def _mask(self, targets: Ints) -> Bools:
-        """Return which targets these are; the last entry stands for contacts."""
+        """Return a mask of these targets; its last entry stands for contacts and is false."""
         mask = np.zeros(len(self._problem.target_ids) + 1, dtype=np.bool_)
         mask[targets] = True
         mask[-1] = False

@@ -1,10 +1,10 @@
-"""Moves on a route: a few tasks in a row are planned anew by labels over cells of starts.
+"""Moves on a route: a few consecutive tasks are replanned by label setting over cells of starts.
 
-A label is a chain of tasks from the task before the window, each as early as it can be. In each
-cell of a task's starts the best one is kept. Targets that the satellites image outside the
-window may be taken at next to no gain: where that happens the other image goes, and leaves a
-hole for something else. Arrivals are estimates from the table; the chain that is chosen is
-worked out exactly, and given up where it does not hold.
+A label is a chain of tasks from the task before the window on, each as early as possible. The best
+label in each cell of a task's starts is kept. Targets imaged outside the window may be taken at
+next to no gain: the other image is then dropped, which leaves room for something else. Starts in
+labels are estimates from the table of earliest starts; those of the chosen chain are computed
+exactly, and the move is given up if the chain does not fit.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ _AIMED: Final = TUNING.aimed
 _ATTEMPTS: Final = TUNING.patience
 
 Within = tuple[float, float]
-"""When a window begins, and by when the task after it must have its start."""
+"""When a window begins, and the latest start of the task after it (s)."""
 
 
 @bundle
 class Scratch(NamedTuple):
-    """Room for the labels of one move.
+    """Working memory for the labels of one move.
 
-    ``mark`` counts the moves: what bears another mark is of an earlier one. Labels: ``task``,
-    ``start_s``, ``value``, ``gain`` (what counts), ``parent`` and ``following`` in the bucket.
+    ``mark`` counts the moves: entries with another mark are stale. Labels: ``task``, ``start_s``,
+    ``value`` (with random ties), ``gain`` (without), ``parent`` and ``following`` in the bucket.
     """
 
     mark: Ints
@@ -68,14 +68,14 @@ class Scratch(NamedTuple):
 
 @bundle
 class RouteSearch(NamedTuple):
-    """What moves on one satellite's route look at, and what they change.
+    """What moves on one satellite's route read, and what they change.
 
     Attributes
     ----------
     worth
-        Of each task; what must be kept is worth more than all else. Shape ``(n,)``.
+        Of each task; a kept task is worth more than all others together. Shape ``(n,)``.
     imaged_by
-        For each target the task that images it, or ``UNASSIGNED``, ``ELSEWHERE`` or ``FIXED``.
+        The task that images each target, or ``UNASSIGNED``, ``ELSEWHERE`` or ``FIXED``.
         Shape ``(num_targets,)``.
     """
 
@@ -90,7 +90,7 @@ class RouteSearch(NamedTuple):
 
 
 def scratch_of(num_tasks: int, num_cells: int, num_targets: int) -> Scratch:
-    """Return room for the moves on a route."""
+    """Return working memory for the moves on a route."""
     return Scratch(
         mark=np.zeros(1, dtype=np.int32),
         task=np.empty(ROUTE_LABELS, dtype=np.int32),
@@ -123,7 +123,7 @@ def make_moves(
     longest: int,
     stop: Bytes,
 ) -> None:
-    """Make moves, in place, of windows that take up ``longest`` tasks at the most."""
+    """Make moves in place, on windows of at most ``longest`` tasks."""
     spans, route, draws = search.spans, search.route, search.draws
     worth, imaged_by = search.worth, search.imaged_by
     n = len(spans.open_s)
@@ -155,7 +155,7 @@ def _replan(
     first: int,
     end: int,
 ) -> bool:
-    """Plan the tasks ``first`` up to ``end`` anew; return whether the route has changed."""
+    """Replan the tasks from ``first`` up to ``end``; return whether the route has changed."""
     spans, view, route, scratch = search.spans, search.looks, search.route, search.scratch
     worth, imaged_by = search.worth, search.imaged_by
     scratch.mark[0] += 1
@@ -184,7 +184,7 @@ def _replan(
         held = imaged_by[spans.site[task]]
         imaged_by[spans.site[task]] = task
         if held >= 0:
-            # It is imaged twice now: the other image goes, perhaps of the same access.
+            # The target is imaged twice now: drop the other image, perhaps of the same access.
             p = position_of(route, held, first, first + size)
             if p >= 0:
                 remove(spans, view, route, p)
@@ -197,7 +197,7 @@ def _replan(
 def _time_chain(
     spans: TimeWindows, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> bool:
-    """Work out the chain's earliest starts; return whether it fits before what comes after."""
+    """Compute the chain's earliest starts; return whether it fits before the next task."""
     before, start_s = -1, 0.0
     if first > 0:
         before, start_s = route.task[first - 1], route.early_s[first - 1]
@@ -217,7 +217,7 @@ def _time_chain(
 def _put_in(
     spans: TimeWindows, view: View, route: Route, scratch: Scratch, first: int, end: int, size: int
 ) -> None:
-    """Put the chain in place of the tasks ``first`` up to ``end``."""
+    """Replace the tasks from ``first`` up to ``end`` by the chain."""
     n, shift = route.size[0], size - (end - first)
     if shift > 0:
         for p in range(n - 1, end - 1, -1):
@@ -244,7 +244,7 @@ def _best_chain(
     end: int,
     old_gain: float,
 ) -> int:
-    """Return the last label of the best chain: -1 for none at all, ``NOWHERE`` if all are worse."""
+    """Return the last label of the best chain: -1 if it is empty, ``NOWHERE`` if all are worse."""
     spans, view, route, scratch = search.spans, search.looks, search.route, search.scratch
     after, late_s = -1, np.inf
     looks = (1.0, 0.0, 0.0)
@@ -291,7 +291,7 @@ def _best_chain(
 def _extend(
     search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
-    """Offer all that may follow a task at a start; return the number of labels then."""
+    """Offer every task that may follow a task at a start; return the new number of labels."""
     spans, earliest = search.spans, search.earliest
     cell = cell_of(earliest, spans, task, start_s)
     edge = edge_s(earliest, spans, task, cell)
@@ -309,7 +309,10 @@ def _extend(
 def _offer(
     search: RouteSearch, count: int, task: int, start_s: float, parent: int, within_s: Within
 ) -> int:
-    """Keep a chain that goes on to a task, where it is the best in its cell."""
+    """Add the label of a chain that continues to a task if it is the best up to its cell.
+
+    Returns the new number of labels.
+    """
     spans, earliest, scratch = search.spans, search.earliest, search.scratch
     worth, imaged_by = search.worth, search.imaged_by
     from_s, late_s = within_s

@@ -35,7 +35,7 @@ from planner_core.referee.replay import replay
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Satellite:
-    """What the search knows of one satellite, and its part of the plan."""
+    """One satellite's search data, and its part of the plan."""
 
     spans: TimeWindows
     view: View
@@ -44,11 +44,11 @@ class Satellite:
 
     @classmethod
     def of(cls, problem: Problem, index: int, plan: Plan) -> Satellite:
-        """Return a satellite with its part of a plan, each target in it once."""
+        """Return a satellite with its part of a plan, in which each target is taken once."""
         table = problem.opportunities
         spans, view = spans_of(problem, index), view_of(problem, index)
         worth = problem.worth[spans.row]
-        # What must be taken is worth more than all else, so that no move drops it.
+        # A kept task is worth more than all others together, so that no move drops it.
         worth[spans.is_kept] += 1.0 + float(problem.best_worth.sum())
         tasks: dict[int, int] = {}
         for action in plan.actions:
@@ -70,14 +70,14 @@ class Satellite:
 
     @property
     def tasks(self) -> Ints:
-        """Return the tasks of its part of the plan, in order."""
+        """Tasks of its part of the plan, in order."""
         return self.route.task[: self.route.size[0]]
 
 
 class ContinuousSearch:
-    """A plan of a problem without resources, and moves that make it better.
+    """A plan of a problem without resources, and moves that improve it.
 
-    Where the plan to start from has contacts, they are dropped.
+    Contacts of the plan to start from are dropped.
     """
 
     def __init__(self, problem: Problem, plan: Plan, budget: Budget, seed: int) -> None:
@@ -93,7 +93,7 @@ class ContinuousSearch:
         self._width_s = max(rough_cell_s(), width_for(problem))
 
     def earliest(self, index: int) -> EarliestStarts:
-        """Return a satellite's table; kept from turn to turn where all of them are small."""
+        """Return a satellite's table; keep it for later calls if all kept ones stay small."""
         table = self._tables.get(index)
         if table is None:
             satellite = self.satellites[index]
@@ -106,7 +106,7 @@ class ContinuousSearch:
         return table
 
     def fill(self) -> None:
-        """Put into the gaps of the plan what fits, the greatest rewards first."""
+        """Insert tasks that fit into the gaps of the plan, in order of worth."""
         for index, satellite in enumerate(self.satellites):
             order = np.lexsort((satellite.spans.open_s, -satellite.worth)).astype(np.int32)
             insert_each(
@@ -118,7 +118,7 @@ class ContinuousSearch:
     def move(self, num_moves: int) -> bool:
         """Make moves on each satellite in turn; return whether the plan earns more.
 
-        A satellite whose table is not kept has its moves all at once, in one call of many.
+        A satellite whose table is not kept makes the moves of several calls in one of them.
         """
         before = self.reward
         self._num_calls += 1
@@ -153,7 +153,7 @@ class ContinuousSearch:
             self._give_up(index, site)
 
     def _imaged_by(self, index: int) -> Ints:
-        """Return who has each target, as one satellite sees it."""
+        """Return what images each target, as one satellite sees it."""
         imaged_by = np.full(len(self.problem.target_ids), UNASSIGNED, dtype=np.int32)
         for other in self.satellites:
             is_kept = other.spans.is_kept[other.tasks]
@@ -163,7 +163,7 @@ class ContinuousSearch:
         return imaged_by
 
     def _give_up(self, index: int, site: int) -> None:
-        """Take a target from whoever else holds it."""
+        """Remove a target from the other satellites' routes."""
         for other, satellite in enumerate(self.satellites):
             if other == index:
                 continue
@@ -171,7 +171,7 @@ class ContinuousSearch:
                 remove(satellite.spans, satellite.view, satellite.route, p)
 
     def _note(self) -> None:
-        """Keep the plan of the routes if it is better."""
+        """Keep the plan of the current routes if it is better."""
         actions = []
         for satellite in self.satellites:
             starts = satellite.route.early_s[: satellite.route.size[0]].tolist()

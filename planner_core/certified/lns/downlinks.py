@@ -1,4 +1,4 @@
-"""Contacts inserted into a plan, and images taken elsewhere, so that its images come down."""
+"""Contacts inserted into a plan, and images moved, so that its images are downlinked."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.view import Judge, View
 
 Accepts = Callable[[View], bool]
-"""Whether a plan costs no worth, and comes nearer to the aim."""
+"""Whether a trial plan is accepted: it loses no worth, and is better."""
 
 
 def brought_down(problem: Problem, plan: Plan, budget: Budget, judge: Judge | None = None) -> Plan:
-    """Return the plan with its images on the ground, where that earns more.
+    """Return the plan with more of its images downlinked if that earns more.
 
-    By contacts that fit beside its tasks, and by other images of the same targets.
+    Adds contacts that fit beside its tasks, and takes other images of the same targets.
 
     Parameters
     ----------
     judge
-        Who judges plans; the referee by default.
+        Judges plans; the referee by default.
     """
     if not problem.counts_delivery:
         return plan
@@ -51,10 +51,10 @@ def brought_down(problem: Problem, plan: Plan, budget: Budget, judge: Judge | No
 
 
 def _taken_elsewhere(view: View, accepts: Accepts, budget: Budget) -> View:
-    """Return the plan with the last images that never come down taken elsewhere, where one can.
+    """Return the plan with the few images that never come down replaced by others, if possible.
 
-    Searches for plans go by the most that an image can earn. Where nearly all images of a fleet
-    come down, those that do not are found here: of 20 satellites over 2,000 cities two were left.
+    Searches for plans go by the most that an image can earn. If nearly all images of a fleet come
+    down, this replaces the rest: with 20 satellites over 2,000 cities two were left.
     """
     images = view.timeline.collected
     stranded = [target for target, image in images.items() if image.delivered_s is None]
@@ -83,7 +83,7 @@ def _taken_elsewhere(view: View, accepts: Accepts, budget: Budget) -> View:
 
 
 def with_contacts(view: View, accepts: Accepts, budget: Budget) -> View:
-    """Return the plan with contacts that bring images down sooner, one a gap at a time."""
+    """Return the plan with contacts that bring images down sooner, one per gap at a time."""
     while not budget.is_spent():
         trial = _settled(view, _best_of_gaps(view), budget)
         if trial is None or not accepts(trial):
@@ -93,7 +93,7 @@ def with_contacts(view: View, accepts: Accepts, budget: Budget) -> View:
 
 
 def _settled(view: View, rows: list[int], budget: Budget) -> View | None:
-    """Return the plan with as many of these contacts as break nothing; None where none does."""
+    """Return the plan with as many of these contacts as break no rule; None if none is left."""
     problem = view.problem
     table = problem.opportunities
     while rows and not budget.is_spent():
@@ -106,14 +106,14 @@ def _settled(view: View, rows: list[int], budget: Budget) -> View | None:
         for violation in broken:
             own = [row for row in rows if table.satellite[row] == violation.satellite]
             before = [r for r in own if table.start_s[r] <= violation.at_s + TIME_TOLERANCE_S]
-            # The last one before it, and all at once where none is: the search must end.
+            # Drop the last one before the violation, or all if none is, so that the loop ends.
             gone |= set(sorted(before)[-1:] or own)
         rows = [row for row in rows if row not in gone] if gone else []
     return None
 
 
 def _best_of_gaps(view: View) -> list[int]:
-    """Return, of each gap between contacts, the contact that fits and gains most time."""
+    """Return, for each gap between contacts, the contact that fits and saves most time."""
     table = view.problem.opportunities
     taken = np.array([action.opportunity for action in view.plan.actions], dtype=np.int32)
     is_contact = table.kind[taken] == CONTACT
@@ -125,7 +125,7 @@ def _best_of_gaps(view: View) -> list[int]:
         fits = _fit_between(view.problem, satellite, [row for rows in gaps for row in rows], own)
         for rows in gaps:
             for row in rows:
-                # Contacts of others matter where they hold an antenna.
+                # Contacts of other satellites matter if they hold the antenna.
                 if row in fits and not conflicts(view.problem, row, contacts):
                     contacts = np.append(contacts, row)
                     break
@@ -136,7 +136,7 @@ def _best_of_gaps(view: View) -> list[int]:
 def _fit_between(
     problem: Problem, satellite: SatelliteProblem, rows: Sequence[int], taken: Ints
 ) -> set[int]:
-    """Return which of these rows a satellite has time for beside those that it has taken."""
+    """Return which of these rows a satellite has time for besides those that it has taken."""
     local = problem.local_row
     beside = np.sort(local[taken])
     excluded, _ = excluded_beside(satellite, local[np.array(rows, dtype=np.int64)], beside)
@@ -144,9 +144,9 @@ def _fit_between(
 
 
 def _by_gap(view: View, satellite: SatelliteProblem, taken: Ints) -> Iterator[list[int]]:
-    """Yield contacts that are not taken, by the taken one they follow, those that gain most first.
+    """Yield, for each gap between taken contacts, the others in it, those that save most first.
 
-    What one gains is the time that it saves images which wait for the next contact.
+    A contact saves the time that waiting images would otherwise wait for the next taken one.
     """
     problem = view.problem
     table, local = problem.opportunities, problem.local_row

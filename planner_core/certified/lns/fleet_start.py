@@ -1,8 +1,8 @@
-"""A first plan of a fleet: one stretch of one satellite after another, over what is left.
+"""A first plan of a fleet: one part of the network after another, over the targets that are left.
 
-Taken alone the first ones would snatch targets that only the last ones can reach. At the
-multipliers of the bound a target that several can have is worth little to each of them, and all end
-up with about what the best plans give them.
+By worth alone, the first parts would take targets that only the last ones can reach. At the
+multipliers of the bound, a target that several parts can image is worth little to each, and each
+part ends up with about what the best plans give it.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from planner_core.problem import Bools, Floats, Ints
 def start_at_multipliers(
     network: Network, worth: Floats, multipliers: Floats, taken: Bools, seed: int
 ) -> list[int]:
-    """Return the rows of the best of a few plans; what they earn counts without the multipliers.
+    """Return the rows of the plan that earns most (multipliers not deducted) of a few.
 
     Parameters
     ----------
     worth
         Of each node. Shape ``(n,)``.
     multipliers
-        Of each site, with a last entry of zero that stands for contacts.
+        Of each target, with a last entry of zero that stands for contacts.
     taken
-        Places that are taken already. Shape of ``multipliers``.
+        Targets that are taken already. Shape of ``multipliers``.
     """
     rng = np.random.default_rng(seed)
     priced = np.maximum(worth - multipliers[network.site], TUNING.trifle * worth)
@@ -53,7 +53,7 @@ def _take(
     network: Network, part: int, priced: Floats, worth: Floats, is_left: Bools,
     weight: Floats, value: Floats, previous: Ints,
 ) -> Ints:  # fmt: skip
-    """Return the best node of each target that is left on the heaviest path, and take those."""
+    """Return the best node of each free target on the heaviest path, and mark these as taken."""
     for a in range(network.first[part], network.first[part + 1]):
         weight[a] = priced[a] if is_left[network.site[a]] else 0.0
     _, at = heaviest_path(network, part, weight, value, previous)

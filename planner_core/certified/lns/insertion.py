@@ -1,4 +1,4 @@
-"""Insertion: what fits between the tasks of a route, once those may move, is put in."""
+"""Insertion: tasks that fit between those of a route, if these may move, are put in."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from planner_core.problem import Bools, Bytes, Ints
 
 @borrowing_inner
 def first_near(route: Route, instant_s: float) -> int:
-    """Return the first task that may still start at an instant or later."""
+    """Return the position of the first task that may still start at an instant or later."""
     low, high = 0, route.size[0]
     while low < high:
         middle = (low + high) // 2
@@ -32,9 +32,9 @@ def first_near(route: Route, instant_s: float) -> int:
 
 @borrowing_inner
 def fits_at(spans: TimeWindows, view: View, route: Route, task: int, p: int) -> float:
-    """Return the earliest start of a task before position ``p``; infinite where it cannot be.
+    """Return the earliest start of a task inserted before position ``p``; infinite if it cannot be.
 
-    Minus infinity where it comes too late after the task ahead of it, and so would further on.
+    Minus infinity if its window closes before the task ahead allows it, there and further on.
     """
     before, start_s = -1, 0.0
     if p > 0:
@@ -54,7 +54,7 @@ def fits_at(spans: TimeWindows, view: View, route: Route, task: int, p: int) -> 
 def insert_each(
     spans: TimeWindows, view: View, order: Ints, imaged_by: Ints, route: Route, stop: Bytes
 ) -> None:
-    """Put in each task of ``order`` whose target nobody has, where it fits first."""
+    """Insert each task of ``order`` whose target is unassigned at the first position it fits."""
     for task in order:
         if stop[0]:
             return
@@ -86,7 +86,7 @@ def _put_in(
 
 @kernel
 def fitting(spans: TimeWindows, view: View, route: Route, is_free: Bools) -> tuple[Ints, Ints]:
-    """Return the tasks on free places that fit by agility, and the position of each."""
+    """Return the tasks on free sites that fit by agility, once for each position, and these."""
     tasks, positions = [np.int32(0) for _ in range(0)], [np.int32(0) for _ in range(0)]
     for task in range(len(spans.row)):
         if not is_free[spans.site[task]]:

@@ -1,8 +1,8 @@
-"""Insertion where battery and recorder count: contacts stay, and the referee has the last word.
+"""Insertion under battery and recorder: contacts stay, and the referee judges each trial.
 
-Tasks move as early as those before them allow. Whatever then fits between two of them by agility
-is put in on trial, the images of greatest worth first, and stays in where the whole plan
-remains valid. A window is planned anew by the same means: a few images in a row are dropped before.
+Tasks move as early as those before them allow. Images that then fit between two of them by agility
+are inserted on trial, those of greatest worth first, and stay if the whole plan is valid and earns
+more. To replan a window, a few consecutive images are dropped first.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from planner_core.referee.replay import replay
 
 
 def filled_with_resources(problem: Problem, plan: Plan, budget: Budget) -> Plan:
-    """Return a plan that earns no less, with what fits between its tasks once those may move."""
+    """Return a plan that earns no less, with images inserted between tasks that may move."""
     timeline = replay(problem, plan, in_detail=False)
     if not timeline.is_valid:
         return plan
@@ -46,7 +46,7 @@ def filled_with_resources(problem: Problem, plan: Plan, budget: Budget) -> Plan:
 def replanned_window(
     problem: Problem, plan: Plan, budget: Budget, rng: np.random.Generator
 ) -> Plan:
-    """Return the plan with a few images in a row of one satellite dropped, and others put in."""
+    """Return the plan with a few consecutive images of one satellite dropped, others inserted."""
     table = problem.opportunities
     kept = set(problem.kept_rows.tolist())
     index = int(rng.choice(np.unique(table.satellite[[a.opportunity for a in plan.actions]])))
@@ -77,9 +77,9 @@ def _filled(
     Parameters
     ----------
     num_trials
-        How many in a row may not fit after all.
+        How many trials in a row may fail.
     rng
-        To draw the order of images that are worth the same; by default the first come first.
+        Draws the order of images that are worth the same; by default in order of start.
     """
     table = problem.opportunities
     own = [a for a in plan.actions if table.satellite[a.opportunity] == index]

@@ -1,8 +1,8 @@
-"""The moves of the window search: a stretch of one satellite's tasks is planned anew.
+"""The moves of the window search: a stretch of one satellite's tasks is replanned.
 
-Between two tasks that stay, the heaviest chain takes the place of what was there. A target that is
-imaged outside the window may be on the chain too, at next to no worth: its other image is then
-dropped, which makes room elsewhere for nothing.
+Between two tasks that stay, the heaviest chain replaces what was there. The chain may also take a
+target that is imaged outside the window, at next to no weight: the other image is then dropped,
+which makes room elsewhere at no cost.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ _TIE: Final = TUNING.tie
 
 @bundle
 class SearchData(NamedTuple):
-    """What moves do not change. Shape ``(n,)``, for the nodes of the network, unless said.
+    """What moves do not change. Shape ``(n,)``, for the nodes of the network, unless stated.
 
     Attributes
     ----------
     is_transitive
-        Whether the tasks around one can do without it in any case. Shape ``(num_parts,)``.
-    worth
-        Of each node.
+        Whether dropping any task leaves its neighbours compatible. Shape ``(num_parts,)``.
     preference
-        By how much the search prefers a target to others of its worth, as a factor.
+        Factor on each target's worth by which the search prefers some targets to others.
         Shape ``(num_targets + 1,)``.
     is_kept
-        What every plan must take.
+        Nodes that every plan must take.
     is_locked
         Which targets are imaged by a kept task. Shape ``(num_targets + 1,)``.
     kept_worth
-        More than all targets together.
+        Added to the worth of a kept node: more than all targets together.
+    is_alike
+        Whether all nodes are worth the same.
     """
 
     network: Network
@@ -76,7 +76,7 @@ def make_moves(
     Parameters
     ----------
     offered
-        Nodes that moves may take beside those that are taken. Shape ``(n,)``.
+        Nodes that moves may take besides those that are taken. Shape ``(n,)``.
     """
     if len(search.network.site) == 0:
         return
@@ -92,7 +92,7 @@ def make_moves(
             left -= 1
         while right < end and not plan.is_taken[right]:
             right += 1
-        # What begins before the task on the left ends is in no chain after it.
+        # A node that begins before the task on the left ends cannot follow it.
         if left >= begin:
             after_s = search.network.end_s[left] - TIME_TOLERANCE_S
             while low < high and search.network.start_s[low] < after_s:
@@ -110,7 +110,7 @@ def make_moves(
 
 @borrowing_inner
 def _pivot(search: SearchData, plan: Assignment, offered: Bools, draws: Uint64s) -> int:
-    """Return a node at random, mostly one of a target that is not imaged."""
+    """Return a random node, mostly one whose target is not imaged."""
     n = len(search.network.site)
     num_trials = _TRIALS if next_draw(draws) < _FOR_UNASSIGNED else 1
     pivot = 0
@@ -136,7 +136,7 @@ def _part_of(search: SearchData, node: int) -> int:
 
 @borrowing_inner
 def _window(plan: Assignment, pivot: int, begin: int, end: int, draws: Uint64s) -> tuple[int, int]:
-    """Return the nodes between two tasks of the plan, a few tasks apart, around the pivot."""
+    """Return the range of nodes around the pivot between two tasks of the plan, a few apart."""
     num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
     num_before = int(next_draw(draws) * (num_tasks + 1))
     lowest, highest = max(begin, pivot - WINDOW_NODES // 2), min(end, pivot + WINDOW_NODES // 2)
@@ -168,11 +168,10 @@ def _weigh(
     high: int,
     draws: Uint64s,
 ) -> int:
-    """Give a window's nodes weights; return how many words a set of its targets takes.
+    """Set the weights of a window's nodes; return how many 64-bit words a set of its targets takes.
 
-    Only those targets have a place in such sets that are in the window more than once.
-
-    Ties are broken at random, so that the search wanders over plans of equal worth.
+    Only targets that are in the window more than once have a bit in such sets. Ties are broken at
+    random, so that the search wanders over plans of equal worth.
     """
     move = work.move[0] + 1
     work.move[0] = move
@@ -212,7 +211,7 @@ def _weigh(
 def _replace(
     search: SearchData, plan: Assignment, work: Workspace, low: int, high: int, last: int
 ) -> None:
-    """Let a chain take the place of what is in the window, unless the plan is worth less then."""
+    """Replace the window's tasks by a chain, unless the plan would be worth less."""
     num_new, worth = 0, 0.0
     at = last
     while at >= 0:
@@ -275,7 +274,7 @@ def _let_go(search: SearchData, plan: Assignment, node: int) -> None:
 
 @borrowing_inner
 def _is_sound_around(search: SearchData, plan: Assignment, node: int) -> bool:
-    """Return whether the tasks around one that was let go can do without it."""
+    """Return whether the tasks around a dropped one are compatible without it."""
     part = _part_of(search, node)
     if search.is_transitive[part]:
         return True

@@ -1,9 +1,9 @@
-"""Plans with given contacts, where images are worth less the later they come down.
+"""Plans with given contacts, if images are worth less the later they come down.
 
-With the contacts that a plan must take, the programme over queues has one stretch of tasks between
-two contacts after another, and takes a fraction of a second. It may take a target twice; then one
-of the two is settled on, until there is none. Of a fleet one satellite's day can be planned anew
-beside what the others do.
+With fixed contacts, the programme over queues handles the stretches of tasks between two contacts
+one after another, which takes a fraction of a second. It may take a target twice; then the target
+is settled on one of the two tasks, until no target is taken twice. In a fleet, one satellite's day
+can be replanned while the others keep theirs.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from planner_core.solvers.sequential import blocked_rows
 def plan_with_queues(
     problem: Problem, multiplier: Floats, rng: np.random.Generator, stop: Bytes, per_collect: int
 ) -> Plan | None:
-    """Return a good plan that takes no contacts but those that it must; None without programmes.
+    """Return a good plan without optional contacts; None if a programme would take too long.
 
-    A recorder that is rounded against a plan costs an image at each contact: 206.4 of 209.7 and
-    not 208. So it is rounded in favour of plans first, and against them where one overflows.
+    Rounding the recorder against a plan costs an image at each contact: 206.4 instead of 208, of
+    209.7. So it is rounded in favour of plans first, and against them if the plan is not valid.
 
     Parameters
     ----------
     multiplier
         Of each target, which keeps satellites from taking it twice. Shape ``(num_targets,)``.
     per_collect
-        How many levels of energy the cheapest collect takes. Rounded against the plan, they cost it
-        up to one in each orbit.
+        Energy levels that the cheapest collect takes. Rounded against the plan, they cost it up to
+        one collect in each orbit.
     """
     for keeps_recorder in (False, True):
         plan = _plan(problem, multiplier, rng, stop, per_collect, keeps_recorder=keeps_recorder)
@@ -62,13 +62,13 @@ def replanned_day(
     stop: Bytes,
     per_collect: int,
 ) -> Plan | None:
-    """Return the plan with a satellite's day planned anew beside the others; None if it cannot be.
+    """Return the plan with one satellite's day replanned, the others unchanged; None if impossible.
 
-    The programme over queues names its contacts, among those that the plan has and others whose
-    antenna is free: some of them, drawn at random, where they are many. A quarter of the levels of
-    energy suffices. With all contacts and half of the levels that takes three times as long, and
-    two fleets earn 912.6 and 972.0 after 40 CPU seconds in place of 931.3 and 970.1. Where the
-    programme would take too long contacts stay as they are.
+    The programme over queues chooses its contacts among those of the plan and others whose antenna
+    is free (a random sample if these are many). A quarter of the energy levels suffices. With all
+    contacts and half of the levels, that takes three times as long, and two fleets earn 912.6 and
+    972.0 after 40 CPU seconds instead of 931.3 and 970.1. If this programme would take too long,
+    the satellite keeps its contacts.
     """
     table = problem.opportunities
     rows = np.array([action.opportunity for action in plan.actions], dtype=np.int32)
@@ -103,9 +103,10 @@ def replanned_day(
 
 
 def some_contacts(satellite: SatelliteProblem, num_rows: int, rng: np.random.Generator) -> Bools:
-    """Return half of a satellite's contacts, or all where they are few. Shape ``(num_rows,)``.
+    """Return a mask of a random half of a satellite's contacts, all if few. Shape ``(num_rows,)``.
 
-    With a network of 36 stations it has a thousand, and half of them would take 20 s for a day.
+    At most ``2 * FEW_CONTACTS``: with 36 stations a satellite has a thousand contacts a day, and a
+    day with half of them would take 20 s.
     """
     contacts = satellite.rows[satellite.kind == CONTACT]
     number = min(len(contacts), max(len(contacts) // 2, FEW_CONTACTS), 2 * FEW_CONTACTS)
@@ -123,15 +124,15 @@ def _named_contacts(
     per_collect: int,
     stop: Bytes,
 ) -> list[int] | None:
-    """Return the contacts that a satellite would take beside what the others do.
+    """Return the contacts that a satellite would take, given the others' tasks.
 
-    None where the programme would take too long.
+    None if the programme would take too long.
 
     Parameters
     ----------
     is_free, is_tried
-        The targets that it may image, and the contacts that it may take. Shapes
-        ``(num_targets,)`` and ``(n,)``.
+        Targets that it may image, and contacts that it may take. Shapes ``(num_targets,)`` and
+        ``(n,)``.
     """
     taken = others[problem.opportunities.kind[others] == CONTACT]
     is_shut = blocked_rows(problem, satellite, taken.tolist()) != 0
@@ -165,7 +166,7 @@ def _plan(
     *,
     keeps_recorder: bool,
 ) -> Plan | None:
-    """Return a plan of one satellite after another, each over the targets that are left."""
+    """Plan one satellite after another, each over the targets that are left."""
     is_free = np.ones(len(problem.target_ids), dtype=np.bool_)
     rows = list[int]()
     for satellite in problem.satellites:
@@ -200,7 +201,7 @@ def _settled(
     *,
     keeps_recorder: bool,
 ) -> Ints | None:
-    """Return a path of a satellite that takes each target once, of those that are free."""
+    """Return a path of a satellite that takes each free target at most once."""
     network = strict_network_of(problem, satellite)
     is_image = satellite.kind == COLLECT
     is_open = is_image & is_free[satellite.site * is_image]
@@ -222,12 +223,12 @@ def _settled(
         if queues is None:
             return None
         path = rows[most_by_queues(queues, stop)[1]]
-        # What must be taken stays, even two images of a target.
+        # Kept tasks stay, even two images of a target.
         images = rng.permutation(path[is_image[path] & ~network.is_kept[path]])
         _, first, counts = np.unique(satellite.site[images], return_index=True, return_counts=True)
         if counts.max(initial=1) == 1:
             return path
-        # Which of the two matters little: hundreds of others can take its place.
+        # Which of the two stays matters little: hundreds of others can replace the dropped one.
         settled = images[first]
         is_open &= ~(is_image & np.isin(satellite.site, satellite.site[settled]))
         is_open[settled] = True

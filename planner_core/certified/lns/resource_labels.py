@@ -1,8 +1,8 @@
 """The best stretch of one satellite's tasks under battery and recorder, between two that stay.
 
-Paths are those of ``dp.resource_network``. Each task keeps a few labels: what was gained, the
-energy and the data that are left. What comes after the stretch says how much energy it wants, and
-how much data it bears.
+Paths are those of ``dp.resource_network``. Each task keeps a few labels: value gained, energy left
+and data on board. The tasks after the stretch set the least energy and the most data with which
+it may end.
 """
 
 from __future__ import annotations
@@ -26,38 +26,38 @@ from planner_core.problem import (
 
 @bundle
 class SearchData(NamedTuple):
-    """What moves do not change; one satellite's tasks, shape ``(m,)``, unless said.
+    """What moves do not change; one satellite's tasks, shape ``(m,)``, unless stated.
 
     Attributes
     ----------
     network
-        Whose paths are plans that the referee accepts, stations aside.
+        Its paths are plans that the referee accepts, stations aside.
     rows
-        Of each task in the table of opportunities.
+        Row of each task in the table of opportunities.
     local
-        Of each opportunity the task of its satellite. Shape ``(n,)``.
+        Task of each opportunity within its satellite. Shape ``(n,)``.
     satellite
         Of each opportunity. Shape ``(n,)``.
     number
-        The satellite.
+        Index of the satellite searched.
     target
-        Of each task; of contacts, one past the last target.
+        Of each task; for contacts, one past the last target.
     worth
         Of each opportunity. Shape ``(n,)``.
     typical
-        What a target is worth, about.
+        Worth of a typical target.
     is_locked
         Which targets must stay where they are imaged. Shape ``(num_targets + 1,)``.
     is_shut
         Contacts whose antenna another satellite holds.
     liking
-        What each opportunity is liked for beside its worth, in a polish that leaves the worth of
-        the plan and its contacts as they are; nothing else asks for it. Shape ``(n,)``.
+        Secondary objective of each opportunity; used by a polish only, which leaves the worth of
+        the plan and its contacts as they are. Shape ``(n,)``.
     is_polish
-        Whether it is one.
+        Whether the search is a polish.
     noise
-        Share of an image's worth that a move draws on top of it at random, at most, and that it
-        may lose.
+        Largest share of an image's worth that a move adds to it at random; a move may lose this
+        share of a typical target.
     """
 
     network: Network
@@ -77,7 +77,7 @@ class SearchData(NamedTuple):
 
 @bundle
 class Workspace(NamedTuple):
-    """Working memory of a window: labels, those that idle, and the tasks that begin to.
+    """Working memory of a window: labels, idle labels, and lists of tasks by when these idle.
 
     Attributes
     ----------
@@ -88,14 +88,14 @@ class Workspace(NamedTuple):
     idle_value, idle_energy, idle_data, idle_label
         Labels that every task from here on may follow.
     next_idle, first_idle
-        Lists of tasks by where they begin to idle.
+        Linked lists of tasks by the task from which on their labels idle.
     gain
         What each task of the window adds to a label's value.
     seen
-        How often each target comes up in the window, as of ``marked_at``.
+        How often each target occurs in the window, as of move ``marked_at``.
         Shape ``(num_targets + 1,)``.
     path, old, dropped
-        Tasks that a move takes, lets go in the window, and opportunities it lets go elsewhere.
+        Tasks that a move takes, drops in the window, and opportunities it drops elsewhere.
     move
         Moves so far. Shape ``(1,)``.
     """
@@ -121,16 +121,16 @@ class Workspace(NamedTuple):
 
 
 class After(NamedTuple):
-    """What comes after a window.
+    """What the tasks after a window need, and what they do to the data.
 
     Attributes
     ----------
     need, bears
-        The least energy and the most data with which that fits.
+        The least energy and the most data at the end of the window with which they are feasible.
     floor, gain
-        Data that the window ends with becomes the larger of ``floor`` and itself with ``gain``.
+        Data at the end of the window becomes ``max(floor, data + gain)`` at the end of the plan.
     left_cost
-        What data that is left at the end costs, of worth for a full recorder.
+        Cost of a recorder that is full at the end, in worth.
     """
 
     need: float
@@ -141,7 +141,7 @@ class After(NamedTuple):
 
 
 def workspace_for(num_targets: int) -> Workspace:
-    """Return working memory for a problem of so many targets."""
+    """Return working memory for a problem with ``num_targets`` targets."""
 
     def floats(length: int) -> Floats:
         return np.zeros(length)
@@ -178,14 +178,14 @@ def best_label(
 ) -> int:  # fmt: skip
     """Find the path that gains most between two tasks; return its last label.
 
-    ``AT_START`` where that is no task at all, ``NOWHERE`` where there is no path.
+    ``AT_START`` if the best path has no tasks, ``NOWHERE`` if there is no path.
     """
     network = search.network
     m, size = len(search.rows), high - low
     for at in range(size + 1):
         work.first_idle[at] = -1
     num_idle = 0
-    # Labels of tasks ahead of one that must be taken lead nowhere.
+    # Labels of tasks ahead of a kept task may not be extended past it.
     earliest, starts_open = low, False
     best, best_energy, best_label = -np.inf, -np.inf, NOWHERE
     charged = give_between(network, left, right) if right < m else 0.0
@@ -258,7 +258,7 @@ def best_label(
 
 @inlined
 def cost_at_end(after: After, data: float) -> float:
-    """Return what the data costs that is left at the end, if a window ends with so much."""
+    """Return the cost of the data left at the end of the plan if the window ends with ``data``."""
     if after.left_cost == 0.0:
         return 0.0
     return after.left_cost * max(after.floor, data + after.gain, 0.0)
@@ -269,9 +269,9 @@ def _extend(
     search: SearchData, work: Workspace, low: int, k: int, begin: int, count: int,
     value: float, energy: float, data: float, label: int,
 ) -> int:  # fmt: skip
-    """Take a task after a label; return how many labels the task has then.
+    """Extend a label by a task; return how many labels the task has then.
 
-    ``energy`` is what is left on arrival, with what the way gives back.
+    ``energy`` is what is left on arrival, including what the arc gives back.
     """
     network = search.network
     if data > network.data_before[k]:
@@ -298,7 +298,7 @@ def _keep(
     values: Floats, energies: Floats, datas: Floats, sources: Ints, begin: int, count: int,
     value: float, energy: float, data: float, source: int,
 ) -> int:  # fmt: skip
-    """Add a label unless another is as good; drop those it outdoes, or the poorest of too many."""
+    """Add a label unless another dominates it; drop those it dominates, or the poorest if full."""
     end = begin + count
     at = begin
     while at < end:

@@ -1,8 +1,8 @@
-"""Moves of the window search under battery and recorder, contacts among them.
+"""Moves of the window search under battery and recorder, contacts included.
 
-A stretch of one satellite's tasks is planned anew. A target that is imaged outside of it may be on
-the new path too, at next to no worth: its other image is then dropped, which leaves energy
-elsewhere for nothing.
+A stretch of one satellite's tasks is replanned. The new path may also take a target that is imaged
+outside the stretch, at next to no gain: the other image is then dropped, which frees energy
+elsewhere at no cost.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def make_moves(
     m = len(search.rows)
     left_cost = search.network.left_cost
     if left_cost > 0.0:
-        # At the multiplier itself fewer plans are worth the same, and the search is sooner stuck
+        # At the cost itself fewer plans are worth the same, and the search gets stuck sooner
         # (docs/bounds.md).
         left_cost *= 2.0 * next_draw(draws)
     for _ in range(num_moves):
@@ -77,7 +77,7 @@ def make_moves(
 
 @borrowing_inner
 def _pivot(search: SearchData, plan: Assignment, draws: Uint64s) -> int:
-    """Return a task at random, mostly one of a target that is not imaged."""
+    """Return a random task, mostly one whose target is not imaged."""
     m = len(search.rows)
     num_trials = _TRIALS if next_draw(draws) < _FOR_UNASSIGNED and not search.is_polish else 1
     pivot = 0
@@ -91,7 +91,7 @@ def _pivot(search: SearchData, plan: Assignment, draws: Uint64s) -> int:
 
 @borrowing_inner
 def _window(search: SearchData, plan: Assignment, pivot: int, draws: Uint64s) -> tuple[int, int]:
-    """Return the tasks between two of the plan, a few apart, around the pivot."""
+    """Return the range of tasks around the pivot between two of the plan, a few apart."""
     num_tasks = _FEWEST_TASKS + int(next_draw(draws) * (_MOST_TASKS - _FEWEST_TASKS + 1))
     num_before = int(next_draw(draws) * (num_tasks + 1))
     lowest = max(0, pivot - RESOURCE_WINDOW_NODES // 2)
@@ -116,7 +116,7 @@ def _window(search: SearchData, plan: Assignment, pivot: int, draws: Uint64s) ->
 
 @borrowing_inner
 def _state_after(search: SearchData, plan: Assignment, last: int) -> tuple[float, float, bool]:
-    """Return energy and data after the plan's tasks up to one, and whether limits are kept."""
+    """Return energy and data after the plan's tasks up to ``last``, and whether limits are kept."""
     network = search.network
     energy, data = network.energy_start, network.data_start
     before = -1
@@ -136,9 +136,9 @@ def _state_after(search: SearchData, plan: Assignment, last: int) -> tuple[float
 
 @borrowing_inner
 def _data_end(search: SearchData, plan: Assignment, high: int) -> float:
-    """Return the most data that may be left at the end, where tasks from ``high`` on stay.
+    """Return the most data that may be left at the end if the tasks from ``high`` on stay.
 
-    Where the last image must come down that hangs on which one it is. In the window it may be any.
+    It depends on the last image if images must be downlinked; before ``high`` that may be any.
     """
     network = search.network
     if not network.must_deliver:
@@ -156,7 +156,7 @@ def _data_end(search: SearchData, plan: Assignment, high: int) -> float:
 def _after(
     search: SearchData, plan: Assignment, first: int, data_end: float, left_cost: float
 ) -> After:
-    """Return what the plan's tasks from one on want, and make of the data."""
+    """Return what the plan's tasks from ``first`` on need, and what they do to the data."""
     network = search.network
     need, bears, floor, gain = -np.inf, data_end, -np.inf, 0.0
     k = len(search.rows) - 1
@@ -182,7 +182,7 @@ def _after(
 def _cost_of(
     search: SearchData, plan: Assignment, low: int, high: int, data: float, after: After
 ) -> float:
-    """Return what the data costs that stays at the end with the window's tasks as they are."""
+    """Return the cost of the data left at the end if the window's tasks stay as they are."""
     network = search.network
     if after.left_cost == 0.0:
         return 0.0
@@ -201,10 +201,10 @@ def _weigh(
     high: int,
     draws: Uint64s,
 ) -> None:
-    """Say what each task of a window adds to a path, and which targets come up repeatedly.
+    """Set the gain of each task of a window, and count how often each target occurs in it.
 
-    Ties are broken at random, so that the search wanders over plans of equal worth; with more
-    noise over such as are worth less.
+    Ties are broken at random, so that the search wanders over plans of equal worth; with noise
+    also over plans that are worth less.
     """
     move = work.move[0] + 1
     work.move[0] = move
@@ -246,10 +246,10 @@ def _weigh_liking(
     high: int,
     draws: Uint64s,
 ) -> None:
-    """Say the same for a polish: worth above all, then what is liked; contacts stay as they are.
+    """Do the same for a polish: worth first, then liking; contacts stay as they are.
 
-    Half of the moves leave out targets that the plan does not image: where a window could earn
-    more with them, the others would find nothing that is worth the same.
+    Half of the moves leave out targets that the plan does not image: if a window could earn more
+    with them, the best path would never be one that is worth the same.
     """
     move = work.move[0] + 1
     work.move[0] = move
@@ -290,14 +290,12 @@ def _replace(
     last: int,
     saved: float,
 ) -> None:
-    """Let a path take the place of what is in the window, unless the plan is worth less then.
-
-    By no more than the noise, that is.
+    """Replace the window's tasks by a path, unless the plan would lose more than the noise allows.
 
     Parameters
     ----------
     saved
-        What less data at the end is worth.
+        By how much the cost of the data left at the end falls.
     """
     site = search.target
     num_new, worth = 0, saved

@@ -1,4 +1,4 @@
-"""A search for plans under battery and recorder: windows of one satellite replanned, by turns."""
+"""A search for plans under battery and recorder: satellites take turns to replan windows."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from planner_core.solvers.sequential import blocked_rows
 
 
 class ResourceWindows:
-    """A plan of all satellites, and moves that better it or leave it as good."""
+    """A plan of all satellites, and moves that improve it or leave it as good."""
 
     def __init__(self, problem: Problem, seed: int) -> None:
         self._problem = problem
@@ -75,9 +75,9 @@ class ResourceWindows:
         worth
             Of each opportunity with those contacts. Shape ``(n,)``.
         liking
-            What each opportunity is liked for, from -1 to 1. Shape ``(n,)``.
+            Secondary objective of each opportunity, from -1 to 1. Shape ``(n,)``.
         """
-        # The referee sees each step: what a slow satellite needs on its way it will tell.
+        # The referee judges each step: it rejects a drop of a task that a slow satellite needs.
         kept = _kept_targets(self._problem)
         self._searches = [
             search._replace(
@@ -91,12 +91,12 @@ class ResourceWindows:
         ]
 
     def adopt(self, plan: Plan) -> None:
-        """Go on from another plan."""
+        """Continue from another plan."""
         table = self._problem.opportunities
         is_taken = np.zeros(len(table), dtype=np.bool_)
         is_taken[plan.columns.row] = True
         imaged_by = np.full(len(self._problem.target_ids) + 1, UNASSIGNED, dtype=np.int32)
-        # The best image of a target counts, and the first of those.
+        # The best image of a target counts; of equally good ones, the first.
         images = np.flatnonzero(is_taken & (table.kind == COLLECT))[::-1]
         images = images[np.argsort(self._worths[images], kind="stable")]
         imaged_by[table.site[images]] = images
@@ -104,7 +104,7 @@ class ResourceWindows:
         self._note_contacts()
 
     def make_moves(self, num_moves: int, budget: Budget) -> None:
-        """Make at most so many moves, fewer where tasks are few or the budget is spent before."""
+        """Make at most ``num_moves`` moves, fewer if tasks are few or the budget is spent first."""
         while self._searches and num_moves > 0 and not budget.is_spent():
             search = self._searches[self._turn % len(self._searches)]
             self._turn += 1
@@ -112,9 +112,9 @@ class ResourceWindows:
             num_moves -= TUNING.moves_in_a_step
 
     def make_moves_on_each(self, num_moves: float, budget: Budget) -> None:
-        """Make so many moves on each satellite, with the same exceptions.
+        """Make ``num_moves`` moves on each satellite, with the same exceptions.
 
-        Where that is less than one, one move on such a share of them, which take turns.
+        If that is less than one, one move on that share of the satellites, which take turns.
         """
         searches, each = self._searches, max(1, int(num_moves))
         if num_moves < 1.0:
@@ -126,13 +126,13 @@ class ResourceWindows:
             self._make_moves_on(search, min(each, TUNING.patience * _in_a_step(search)), budget)
 
     def anneal(self, num_moves: float, budget: Budget) -> None:
-        """Make so many moves on each satellite at each level of noise; the better plan stays.
+        """Make ``num_moves`` moves on each satellite at each noise level; keep the better plan.
 
         The noising method (Charon and Hudry 1993): worths are drawn up to twice as high, then less
-        and less, and a move may lose as much. Where images differ in worth few moves lead to plans
-        that are worth the same, and a search that never loses is soon stuck: five real satellites
-        over 500 cities, images worth less off nadir, stood at 315 of at most 327 from the third
-        second to the thirtieth.
+        and less, and a move may lose as much. If images differ in worth, few moves lead to plans of
+        the same worth, and a search that never loses is soon stuck: five real satellites over 500
+        cities, images worth less off nadir, stood at 315 of at most 327 from the third second to
+        the thirtieth.
         """
         known, plan = self.reward, self.plan
         for noise in (*np.geomspace(1.0, TUNING.little, TUNING.rounds - 1).tolist(), 0.0):
@@ -146,14 +146,14 @@ class ResourceWindows:
         make_moves(search, self._assignment, self._workspace, self._draws, num_moves, budget.stop)
 
     def _note_contacts(self) -> None:
-        """Forget what contacts shut, where these are no longer those of the plan."""
+        """Forget which contacts are shut if the plan's contacts have changed."""
         taken = self._contacts[self._assignment.is_taken[self._contacts]]
         if not np.array_equal(taken, self._shut_by):
             self._shut_by, self._is_shut = taken, {}
 
     def _shut(self, search: SearchData) -> Bools:
-        """Return the tasks of a satellite whose antenna another one holds."""
-        if not search.is_polish:  # which moves no contact
+        """Return the contacts of a satellite whose antenna another satellite holds, as a mask."""
+        if not search.is_polish:  # a polish moves no contact
             self._note_contacts()
         index, taken = search.number, self._shut_by
         if index not in self._is_shut:
@@ -165,12 +165,12 @@ class ResourceWindows:
 
     @property
     def plan(self) -> Plan:
-        """The plan as it is now."""
+        """The current plan."""
         return Plan.of(self._problem, np.flatnonzero(self._assignment.is_taken).tolist())
 
     @property
     def reward(self) -> float:
-        """What its targets earn, less what data costs that stays on board."""
+        """What the plan's targets earn, less the cost of data that stays on board."""
         held, taken = self._assignment.imaged_by[:-1], self._assignment.is_taken
         left = [cost_on_board(one.network, taken[one.rows]) for one in self._searches]
         return float(self._worths[held[held != UNASSIGNED]].sum()) - sum(left)
@@ -180,13 +180,13 @@ def _locked_targets(problem: Problem) -> Bools:
     """Return which targets stay where they are imaged; the last entry stands for contacts."""
     locked = _kept_targets(problem)
     if not is_transitive(problem):
-        # The tasks around one that is dropped could not do without it.
+        # The tasks around a dropped one might not be compatible without it.
         locked[:] = True
     return locked
 
 
 def _kept_targets(problem: Problem) -> Bools:
-    """Return which targets have an image that must be taken; the last entry stands for contacts."""
+    """Return which targets are imaged by a kept task; the last entry stands for contacts."""
     is_kept = np.zeros(len(problem.target_ids) + 1, dtype=np.bool_)
     table, kept = problem.opportunities, problem.kept_rows
     is_kept[table.site[kept[table.kind[kept] == COLLECT]]] = True
@@ -194,5 +194,5 @@ def _kept_targets(problem: Problem) -> Bools:
 
 
 def _in_a_step(search: SearchData) -> int:
-    """Return how many moves a satellite has at a time: few where it has few tasks."""
+    """Return how many moves a satellite makes at a time: few if it has few tasks."""
     return min(TUNING.moves_in_a_step, math.ceil(TUNING.moves_per_task * len(search.rows)))

@@ -1,8 +1,8 @@
 """One satellite's sequence of tasks, with the earliest and the latest start of each.
 
-The earliest follow from the tasks before, the latest from those after. Between the two a task
-may move freely, so another one may be put in wherever it fits after the one before it at its
-earliest and before the one after it at its latest.
+Earliest starts follow from the tasks before, latest starts from those after. A task may move freely
+between the two, so another may be inserted wherever it fits after the earliest start of the one
+before it and before the latest start of the one after it.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from planner_core.problem.pointing import earliest_start_s, latest_start_s, sigh
 
 @bundle
 class Route(NamedTuple):
-    """A sequence in arrays with room for more; the first ``size[0]`` entries count.
+    """A sequence of tasks in arrays with spare room; the first ``size[0]`` entries count.
 
     Attributes
     ----------
     task
-        Spans in order.
+        Indices of tasks (rows of ``TimeWindows``) in order.
     early_s, late_s
         Earliest and latest start of each.
     """
@@ -37,7 +37,7 @@ class Route(NamedTuple):
 
 
 def empty_route(room: int) -> Route:
-    """Return a route of nothing."""
+    """Return an empty route with room for ``room`` tasks."""
     return Route(
         size=np.zeros(1, dtype=np.int32),
         task=np.zeros(room, dtype=np.int32),
@@ -48,7 +48,7 @@ def empty_route(room: int) -> Route:
 
 @borrowing_inner
 def early_after(spans: TimeWindows, view: View, before: int, start_s: float, task: int) -> float:
-    """Return the earliest start of a task after another one, or of all (``before`` of -1)."""
+    """Return the earliest start of a task after another, or as the first (``before`` of -1)."""
     if before < 0:
         return float(spans.open_s[task])
     end_s = start_s + spans.length_s[before]
@@ -61,7 +61,7 @@ def early_after(spans: TimeWindows, view: View, before: int, start_s: float, tas
 
 @borrowing_inner
 def late_before(spans: TimeWindows, view: View, task: int, after: int, start_s: float) -> float:
-    """Return the latest start of a task before another one, or of all (``after`` of -1)."""
+    """Return the latest start of a task before another, or as the last (``after`` of -1)."""
     if after < 0:
         return float(spans.close_s[task])
     looks = sight(view.path, view.sites_m, spans.site[after], start_s)
@@ -73,7 +73,7 @@ def late_before(spans: TimeWindows, view: View, task: int, after: int, start_s: 
 
 @borrowing
 def update_early(spans: TimeWindows, view: View, route: Route, first: int, until: int) -> bool:
-    """Work out earliest starts from ``first`` on; after ``until`` as long as they change.
+    """Compute earliest starts from ``first`` on; from ``until`` on only while they change.
 
     Returns whether every task can still start in time.
     """
@@ -92,7 +92,7 @@ def update_early(spans: TimeWindows, view: View, route: Route, first: int, until
 
 @borrowing
 def update_late(spans: TimeWindows, view: View, route: Route, last: int, until: int) -> bool:
-    """Work out latest starts from ``last`` back; before ``until`` as long as they change."""
+    """Compute latest starts from ``last`` back; from ``until`` back only while they change."""
     for p in range(last, -1, -1):
         after, start_s = -1, 0.0
         if p + 1 < route.size[0]:
@@ -108,7 +108,7 @@ def update_late(spans: TimeWindows, view: View, route: Route, last: int, until: 
 
 @borrowing
 def remove(spans: TimeWindows, view: View, route: Route, p: int) -> None:
-    """Take the task at a position out; what is around it gains."""
+    """Remove the task at a position, and widen the starts of the tasks around it."""
     n = route.size[0]
     for q in range(p, n - 1):
         route.task[q] = route.task[q + 1]
@@ -121,7 +121,7 @@ def remove(spans: TimeWindows, view: View, route: Route, p: int) -> None:
 
 @borrowing_inner
 def position_of(route: Route, task: int, begin: int, end: int) -> int:
-    """Return where a task stands outside the positions ``begin`` up to ``end``; -1 for nowhere."""
+    """Return the position of a task outside ``begin`` up to ``end``, or -1."""
     for p in range(route.size[0]):
         if route.task[p] == task and not begin <= p < end:
             return p

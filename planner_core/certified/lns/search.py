@@ -1,4 +1,4 @@
-"""Large-neighbourhood search on a plan without resources: windows replanned by longest chains."""
+"""Large neighbourhood search on a plan without resources: windows replanned by longest chains."""
 
 from __future__ import annotations
 
@@ -26,19 +26,18 @@ from planner_core.solvers.base import Solution
 
 
 class WindowSearch:
-    """A plan of all satellites, and moves that better it or leave it as good.
+    """A plan of all satellites, and moves that improve it or leave it as good.
 
-    Only collects and agility count; contacts are dropped. For the same seed the same moves
-    are made, whatever the number of them asked for at a time.
+    Only collects and agility count; contacts are dropped. The same seed makes the same moves,
+    however many each call makes.
 
     Parameters
     ----------
     network
-        Of ``problem``, where it is at hand.
+        Of ``problem``, if it has been built already.
     preference
-        By how much targets not yet imaged are preferred to others of the same reward, as a
-        factor for each; a plan is never given up for one that earns less. Shape
-        ``(num_targets,)``.
+        Factor on the worth of each target that decides which targets a move prefers; a plan is
+        never replaced by one that earns less. Shape ``(num_targets,)``.
     """
 
     def __init__(
@@ -58,17 +57,17 @@ class WindowSearch:
         self.adopt(Plan())
 
     def adopt(self, plan: Plan) -> None:
-        """Go on from another plan."""
+        """Continue from another plan."""
         is_taken = np.zeros(len(self._row), dtype=np.bool_)
         is_taken[[action.opportunity for action in plan.actions]] = True
         is_taken[self.problem.opportunities.kind == CONTACT] = False
         is_taken = is_taken[self._row]
         imaged_by = np.full(len(self.problem.target_ids) + 1, UNASSIGNED, dtype=np.int32)
-        # The best image of a target counts, and the first of those.
+        # The best image of a target counts; of equally good ones, the first.
         own = np.flatnonzero(is_taken)[::-1]
         own = own[np.argsort(self._search.worth[own], kind="stable")]
         imaged_by[self._search.network.site[own]] = own
-        # Where it need not stand, a second image of a target only takes up room.
+        # A second image of a target is dropped if its neighbours can do without it.
         part = np.searchsorted(self._search.network.first, own, side="right") - 1
         is_spare = imaged_by[self._search.network.site[own]] != own
         is_spare &= self._search.is_transitive[part] & ~self._search.is_kept[own]
@@ -76,12 +75,12 @@ class WindowSearch:
         self._assignment = Assignment(is_taken=is_taken, imaged_by=imaged_by)
 
     def make_moves(self, num_moves: int, budget: Budget, offered: Bools | None = None) -> None:
-        """Make so many moves, unless the budget is spent before.
+        """Make ``num_moves`` moves, or fewer if the budget is spent first.
 
         Parameters
         ----------
         offered
-            Opportunities that moves may take, beside those of the plan. Shape ``(n,)``.
+            Opportunities that moves may take besides those of the plan. Shape ``(n,)``.
         """
         nodes = self._every if offered is None else offered[self._row]
         while num_moves > 0 and not budget.is_spent():
@@ -93,18 +92,18 @@ class WindowSearch:
 
     @property
     def plan(self) -> Plan:
-        """The plan as it is now."""
+        """The current plan."""
         return Plan.of(self.problem, np.sort(self._row[self._assignment.is_taken]).tolist())
 
     @property
     def reward(self) -> float:
-        """What its targets earn."""
+        """What the plan's targets earn."""
         held = self._assignment.imaged_by[:-1]
         return float(self._search.worth[held[held != UNASSIGNED]].sum())
 
 
 def num_choices(problem: Problem) -> int:
-    """Return how many accesses offer a collect, at one time or at several."""
+    """Return the number of accesses with at least one collect."""
     table = problem.opportunities
     return len(np.unique(table.access[table.kind == COLLECT]))
 
@@ -112,7 +111,7 @@ def num_choices(problem: Problem) -> int:
 def improved(
     problem: Problem, plan: Plan, moves_per_task: float, budget: Budget, seed: int
 ) -> Plan:
-    """Return a plan that earns no less, after moves in proportion to the accesses."""
+    """Return a plan that earns no less, after ``moves_per_task`` moves for each access."""
     search = WindowSearch(problem, seed)
     search.adopt(plan)
     search.make_moves(int(moves_per_task * num_choices(problem)), budget)
@@ -122,7 +121,7 @@ def improved(
 def polished(
     problem: Problem, solution: Solution, moves_per_task: float, budget: Budget
 ) -> Solution:
-    """Return a search's answer with its plan improved, where agility alone counts."""
+    """Return a search's solution with its plan improved if only agility counts."""
     knows_turns = not (problem.use_resources or problem.turns_in_motion)
     if not knows_turns or moves_per_task == 0.0 or budget.is_spent():
         return solution

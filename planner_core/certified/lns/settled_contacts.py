@@ -1,4 +1,4 @@
-"""What images earn where contacts are settled, and which contacts stations can serve."""
+"""What images earn with given contacts, and which contacts stations can serve."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from planner_core.worth import share_earned
 def with_contacts(
     problem: Problem, contacts: list[int], plan: Plan | None, verdict: Timeline | None
 ) -> Problem:
-    """Return the problem with contacts that must be taken, and what images earn with them.
+    """Return the problem with these contacts kept, and what images earn with them.
 
     Parameters
     ----------
     plan, verdict
-        What else is in the queue, and what the referee says of it; None for nothing.
+        Plan whose images are queued, None for none; the referee's timeline of it, if at hand.
     """
     return replace(
         taking(problem, contacts),
@@ -39,9 +39,9 @@ def worth_with(
 ) -> Floats:
     """Return what each image earns if these contacts are taken, and nothing else changes.
 
-    An image comes down after what a plan has taken before it, and in the first contact after it
-    that has time left. One that the plan holds comes down when it does there, by the verdict that
-    is at hand or the referee is asked for. Shape ``(n,)``.
+    An image comes down in the first contact after it that has time left, after the images that the
+    plan takes before it. An image of the plan comes down when it does there, by ``verdict`` or else
+    by a replay. Shape ``(n,)``.
     """
     table = problem.opportunities
     down_s = np.full(len(table), np.inf)
@@ -65,7 +65,7 @@ def worth_with(
 def _down_s(
     problem: Problem, contacts: Ints, queue: Ints, queue_down_s: Floats, images: Ints
 ) -> Floats:
-    """Return when images of a satellite are down that come after others in the queue."""
+    """Return when images of a satellite are down, each after those queued before it."""
     table = problem.opportunities
     satellite = problem.satellites[int(table.satellite[images[0]])] if len(images) else None
     found = np.full(len(images), np.inf)
@@ -89,7 +89,7 @@ def _down_s(
 
 
 def served(problem: Problem, contacts: tuple[int, ...]) -> list[int]:
-    """Return the contacts for which stations have an antenna, the earlier first."""
+    """Return the contacts for which stations have an antenna, earlier ones first."""
     found = list[int]()
     for row in sorted(contacts, key=lambda row: float(problem.opportunities.start_s[row])):
         if _is_served(problem, found, row):
@@ -98,7 +98,7 @@ def served(problem: Problem, contacts: tuple[int, ...]) -> list[int]:
 
 
 def _is_served(problem: Problem, chosen: list[int], row: int) -> bool:
-    """Return whether the station has an antenna left for a contact beside those chosen."""
+    """Return whether the station has an antenna left for a contact besides those chosen."""
     table = problem.opportunities
     beside = [
         other

@@ -1,7 +1,7 @@
-"""The heaviest chain of tasks in a window, with no target on it twice.
+"""The heaviest chain of tasks in a window that takes no target twice.
 
-Labels are those of ``planner_core.precedence.skyline``; beside each lies the set of the targets on
-its chain that are in the window more than once.
+Labels are those of ``planner_core.precedence.skyline``, each with the set of the targets on its
+chain that are in the window more than once.
 """
 
 from __future__ import annotations
@@ -43,20 +43,21 @@ class Workspace(NamedTuple):
     Attributes
     ----------
     sky
-        Labels of chains, which stand for nodes.
+        Labels of chains, each by its last node.
     value, source
         Of the heaviest chain that ends with each node: weight, and the label before.
     waiting
         Nodes whose labels have not been entered yet, in order of end.
     on_chain
-        Sets of targets, a label's after another's. Shape ``(WINDOW_NODES * WINDOW_WORDS,)``.
+        Sets of targets, one label's after another's.
+        Shape ``((WINDOW_NODES + 1) * WINDOW_WORDS,)``.
     number, marked_at, tie
-        A target's place in those sets (-1 for none) and by how much it is favoured, as of which
-        move. Shape ``(num_targets + 1,)``.
+        Each target's bit in those sets (-1 for none), the move as of which it holds, and the
+        target's random factor for ties. Shape ``(num_targets + 1,)``.
     weight
         Of each node of the window.
     path, old, dropped
-        Nodes that a move takes, lets go in the window, and lets go elsewhere.
+        Nodes that a move takes, drops in the window, and drops elsewhere.
     move
         Moves so far. Shape ``(1,)``.
     """
@@ -77,7 +78,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(num_targets: int) -> Workspace:
-    """Return working memory for a problem of so many targets."""
+    """Return working memory for a problem with ``num_targets`` targets."""
     nodes = WINDOW_NODES + 1
     return Workspace(
         sky=skyline_for(nodes),
@@ -108,7 +109,7 @@ def _looked(network: Network, node: int) -> Vector:
 
 @borrowing_inner
 def follows(network: Network, slews: Slews, a: int, b: int) -> bool:
-    """Return whether a satellite can turn from one node to another in the time between them."""
+    """Return whether a satellite can slew from one node to another in the time between them."""
     room_s = network.start_s[b] - network.end_s[a] - slews.settle_s + TIME_TOLERANCE_S
     return turns_within(slews, room_s, _looked(network, a), _looks(network, b))
 
@@ -118,10 +119,10 @@ def heaviest_chain(
     network: Network, work: Workspace, num_words: int,
     part: int, ends: tuple[int, int], low: int, high: int,
 ) -> int:  # fmt: skip
-    """Find the heaviest chain between two tasks, or none; return its last label.
+    """Find the heaviest chain between two tasks; return its last label.
 
-    ``NO_LABEL`` where that is no task at all, ``NOWHERE`` where the two tasks cannot do
-    without any in between.
+    ``NO_LABEL`` if the chain is empty, ``NOWHERE`` if there is none, as the two tasks are not
+    compatible without one in between.
     """
     sky, (left, right) = work.sky, ends
     slews = slews_in(network, part)
@@ -164,7 +165,7 @@ def heaviest_chain(
 def _wait(
     network: Network, work: Workspace, low: int, k: int, entered: int, num_waiting: int
 ) -> None:
-    """Put a node among those that wait, in order of end."""
+    """Insert a node into the waiting ones, in order of end."""
     at = num_waiting
     while at > entered and network.end_s[low + work.waiting[at - 1]] > network.end_s[low + k]:
         work.waiting[at] = work.waiting[at - 1]
@@ -213,7 +214,7 @@ def _is_subset(words: npt.NDArray[np.uint64], one: int, other: int, num_words: i
 def _best_without(
     network: Network, work: Workspace, slews: Slews, node: int, number: int, num_words: int
 ) -> int:
-    """Return the best label that a node may follow and whose chain has not got its target."""
+    """Return the best label that a node may follow and whose chain does not hold its target."""
     sky, start_s, looks = work.sky, network.start_s[node], _looks(network, node)
     if number < 0:
         return best_ahead(sky, start_s, looks, slews)
