@@ -1,9 +1,9 @@
 """Multipliers of antennas at which contacts pay for what they bring down, from a linear program.
 
-Where stations cannot serve all satellites, what a fleet brings down is limited by how long an
-antenna serves any of them. The subgradient steps of ``ResourceAscent`` find that slowly: a
-satellite that pays for one contact takes another. The program knows all contacts at once, and
-nothing of energy or agility: those are for the exact programmes to say.
+If stations cannot serve all satellites, antenna time limits what a fleet brings down. The
+subgradient steps of ``ResourceAscent`` find such multipliers slowly: a satellite that pays for one
+contact takes another. The program knows all contacts at once, but nothing of energy or agility,
+which the exact programmes account for.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from planner_core.problem.delivery import lost_on_board
 
 
 class AntennaMultipliers(NamedTuple):
-    """What the program says that antennas and images are worth.
+    """What antennas and images are worth by the program.
 
     Attributes
     ----------
     of_groups
-        Multipliers of places in ``antenna_groups``. Shape ``(num_groups,)``.
+        Multiplier of each of the ``antenna_groups``. Shape ``(num_groups,)``.
     share
-        What the images of a target earn in the mean once they have paid for coming down. Shape
-        ``(num_targets,)``.
+        Mean share of their worth that the images of each target keep after paying for coming down.
+        Shape ``(num_targets,)``.
     """
 
     of_groups: Floats
@@ -44,11 +44,11 @@ class _Downlink:
     Attributes
     ----------
     own, size
-        The satellite's opportunities, and what images hold, in recorder capacities. Shape
+        The satellite's opportunities, and the sizes of images, in recorder capacities. Shape
         ``(len(satellite),)``.
     rows, recorded, volume
-        Contacts; what the images hold that end before each, in the choice with most; how much of
-        that it takes down at most. Shape ``(m,)``.
+        Contacts; the total size of the images before each, in the choice with most; the most of
+        that it takes down. Shape ``(m,)``.
     """
 
     def __init__(
@@ -68,13 +68,13 @@ class _Downlink:
         self.volume: Floats = np.minimum(-gain[contacts], self.recorded)
 
     def paid_for(self, worth: Floats) -> Floats:
-        """Return what each opportunity gains by data that is worth so much before each contact.
+        """Return what the data of each opportunity is worth, given that before each contact.
 
-        It is worth that of the first contact, by its end, that begins after it.
+        It is the worth before the first contact, by its end, that begins after the opportunity.
         """
         by_start = np.argsort(self._start_s, kind="stable")
         after = np.searchsorted(self._start_s[by_start], self._end_s, side="left")
-        # Of the contacts from one start on, the first by its end; the last entry stands for none.
+        # Of the contacts from each start on, the first by its end; the last entry stands for none.
         first = np.minimum.accumulate(np.append(by_start, len(by_start))[::-1])[::-1]
         return np.append(worth, 0.0)[first[after]] * self.size
 
@@ -91,14 +91,14 @@ def antenna_multipliers(
     Parameters
     ----------
     choices
-        Opportunities that satellites would take, and may not have antennas for: no more comes down
-        than one of these has recorded until then, and that earns what its images lose on board.
-        Shape ``(n,)`` each.
+        Opportunities that satellites would take if antennas allowed. No more comes down by a
+        contact than one of these choices has recorded before it, and data earns what its images
+        lose on board. Shape ``(n,)`` each.
 
     Returns
     -------
-    AntennaPrices | None
-        None where all of it can come down, or time is over.
+    AntennaMultipliers | None
+        None if all of it can come down, or time is over.
     """
     downlinks = [_Downlink(problem, one, choices) for one in satellites]
     # Images after which no contact follows earn what they do on board.
@@ -123,14 +123,14 @@ def antenna_multipliers(
 
 
 def _program(problem: Problem, downlinks: Sequence[_Downlink]) -> Program:
-    """Return the program: its rows are the groups of contacts first, then all contacts."""
+    """Return the program, with rows for the groups of contacts first, then for all contacts."""
     program = Program()
     column = np.full(len(problem.opportunities), -1, dtype=np.int32)
     chains: list[Rows] = []
     together: list[Ints] = []
     for one in downlinks:
         column[one.rows] = taken = program.add_columns(one.volume, is_integer=False)
-        # What has come down at first, which is nothing, and by the end of each contact.
+        # Data that has come down at first (none), and by the end of each contact.
         most = np.append(0.0, one.recorded)
         down = program.add_columns(np.zeros(len(most)), upper=most, is_integer=False)
         terms = (down[1:], 1.0), (down[:-1], -1.0), (taken, -one.volume)
@@ -147,7 +147,7 @@ def _program(problem: Problem, downlinks: Sequence[_Downlink]) -> Program:
 
 
 def _shares(problem: Problem, paid: Floats) -> Floats:
-    """Return the mean of what images of each target earn, as a share of their worth."""
+    """Return what images of each target earn after paying, as a mean share of their worth."""
     table = problem.opportunities
     rows = np.flatnonzero((table.kind == COLLECT) & (problem.worth > 0.0))
     left = problem.worth - np.maximum(lost_on_board(problem) - paid, 0.0)

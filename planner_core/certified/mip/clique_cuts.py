@@ -1,7 +1,7 @@
-"""Sets of tasks of one satellite that exclude each other: what a plan takes one of at most.
+"""Sets of tasks of one satellite that exclude each other, of which a plan takes at most one.
 
-Rows are those of one satellite. Two tasks exclude each other when the order does not relate
-them; a set of such tasks is an clique.
+Rows are those of one satellite. Two tasks exclude each other if neither precedes the other; a set
+of tasks of which each two exclude each other is a clique.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def excluding_pairs(precedence: Precedence) -> tuple[Ints, Ints]:
 
 @inner
 def _first_near(precedence: Precedence) -> Ints:
-    """Return the first row from which each row could be unrelated."""
+    """Return, for each row, the first row that it may exclude."""
     m = len(precedence.near_from)
     first = np.empty(m, dtype=np.int32)
     at = 0
@@ -49,10 +49,10 @@ def _first_near(precedence: Precedence) -> Ints:
 
 @kernel
 def clique_cover(precedence: Precedence) -> tuple[Longs, Ints]:
-    """Return cliques that together hold every pair of tasks that exclude each other.
+    """Return offsets and members of cliques that cover every pair of tasks excluding each other.
 
     Greedy: each pair not yet covered is extended, in order of time, by every task that
-    excludes all members so far. Answers offsets, and the members of all of them.
+    excludes all members so far.
     """
     m = len(precedence.near_from)
     first_near = _first_near(precedence)
@@ -95,10 +95,10 @@ def _extend(precedence: Precedence, clique: Ints, size: int, from_row: int, to_r
 
 @kernel
 def violated_cliques(precedence: Precedence, taken: Floats) -> tuple[Longs, Ints]:
-    """Return cliques of which a fractional plan takes more than one task.
+    """Return offsets and members of cliques of which a fractional plan takes more than one task.
 
-    For each fractional task: the most taken clique in which it is the first, if that is
-    too much, made as large as it can be.
+    For each fractional task, the heaviest clique in which it is the first, if violated, is extended
+    to a maximal one.
 
     Parameters
     ----------
@@ -128,10 +128,10 @@ def violated_cliques(precedence: Precedence, taken: Floats) -> tuple[Longs, Ints
 def _heaviest_clique(
     precedence: Precedence, taken: Floats, row: int, clique: Ints
 ) -> tuple[int, float]:
-    """Fill ``clique`` with ``row`` and the heaviest clique of taken tasks beside it.
+    """Fill ``clique`` with the heaviest clique of ``row`` and later taken tasks; return its size.
 
-    Depth first over the candidates by falling weight, with the sum of what remains as the
-    bound; cut short where that would take long, for a good clique is enough.
+    Also returns its weight. Depth first over the candidates by falling weight, with the sum of the
+    remaining weights as the bound; cut short if it takes long, as a good clique is enough.
     """
     others = np.empty(max(0, precedence.far_from[row] - row - 1), dtype=np.int32)
     falling = np.empty(len(others))
@@ -142,7 +142,7 @@ def _heaviest_clique(
             num_others += 1
     others = others[stable_order(falling[:num_others])]
     k = len(others)
-    # What follows each candidate, at each depth: the candidates that are still free.
+    # Which candidates may still join, at each depth.
     free = np.zeros((k + 1, k), dtype=np.bool_)
     free[0] = True
     at = np.zeros(k + 2, dtype=np.int64)
@@ -195,8 +195,8 @@ def _sort(values: Ints) -> None:
 def detours(direct: Precedence, closed: Precedence) -> tuple[Ints, Ints, Longs, Ints]:
     """Return the pairs of tasks that need another between them, and which ones may be it.
 
-    Answers the earlier and the later tasks, then offsets and rows of the tasks of which
-    one must come right after the earlier one.
+    Returns the earlier tasks, the later tasks, then offsets and rows of the tasks of which one must
+    come right after the earlier one.
     """
     first = [np.int32(0) for _ in range(0)]
     second = [np.int32(0) for _ in range(0)]

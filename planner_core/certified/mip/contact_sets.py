@@ -1,8 +1,8 @@
 """The best plan with given contacts, by mixed-integer programming over promising tasks.
 
-With its contacts fixed the linear relaxation is nearly tight; with contacts free it is not. Its
-multipliers are nearly the best for all plans, and the tasks that it takes at no or little loss hold
-good plans.
+With contacts fixed, the linear relaxation is nearly tight; with contacts free it is not. Its dual
+values are nearly the best multipliers for all plans, and the tasks of little or no reduced cost
+contain good plans.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _CORNER: Final[Mapping[str, str | float]] = {
 
 
 class _Point(NamedTuple):
-    """An optimum of a relaxation, and what its rows and columns are worth."""
+    """An optimum of a relaxation, with its row duals and reduced costs."""
 
     value: float
     columns: Floats
@@ -53,23 +53,23 @@ class _Point(NamedTuple):
 
 class _Engine(Engine):
     def require(self, amount: float) -> None:
-        """Look only for points worth this much, until there is one."""
+        """Look only for points worth at least ``amount``, and stop at the first."""
         for option in ("objective_bound", "objective_target"):
             self._highs.setOptionValue(option, amount - 1e-6 * max(1.0, amount))
 
     def weigh(self, worth: Floats) -> None:
-        """Let columns be worth something else."""
+        """Change the worths of the columns."""
         self._highs.changeColsCost(len(worth), np.arange(len(worth), dtype=np.int32), worth)
 
     def look_no_further(self) -> None:
-        """Begin at the relaxation, with what is whole there, and end with that."""
+        """Complete a fractional start, its whole values fixed, within a single node."""
         self._highs.setOptionValue("mip_max_start_nodes", 1)
 
     def central(self) -> _Point | None:
-        """Return a point amid all optima, with multipliers that are amid all that prove them.
+        """Return a point amid all optima, with dual values amid all that prove them.
 
-        Such multipliers hold for other contacts as well, better than those of a corner. HiGHS has
-        the sign of them right where it minimizes.
+        Such dual values suit other contacts better than those of a corner do. HiGHS gets their sign
+        right when it minimizes.
         """
         highs = self._highs
         self._optimize(-1.0, highspy.ObjSense.kMinimize, _INTERIOR)
@@ -107,16 +107,16 @@ class _Engine(Engine):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Relaxation:
-    """What the relaxation of a program with fixed contacts tells.
+    """Results of the relaxation of a program with fixed contacts.
 
     Attributes
     ----------
     value
-        With clique cuts; minus infinity where there is no point.
+        With clique cuts; minus infinity if there is no point.
     multipliers
-        What it says that each target is worth by itself. Shape ``(num_targets,)``.
+        Of targets, from its row duals. Shape ``(num_targets,)``.
     losses
-        What taking an opportunity would cost; infinite where it may not. Shape ``(n,)``.
+        Reduced costs of opportunities; infinite if not in the program. Shape ``(n,)``.
     """
 
     value: float
@@ -132,9 +132,9 @@ class FixedContacts:
     offered
         Collects that may be taken. Shape ``(n,)``.
     fixed
-        Tasks that must be taken: all contacts, and collects if any.
+        Tasks that must be taken: all contacts of the plan, and collects if any.
     others
-        Contacts that ``fix`` may name.
+        Further contacts that ``fix`` may name.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class FixedContacts:
         self._point: Floats | None = None  # of the last relaxation
 
     def relaxation(self, num_rounds: int = TUNING.tries) -> Relaxation:
-        """Return what the relaxation tells, with multipliers amid all that prove it.
+        """Return the results of the relaxation, with dual values amid all that prove it.
 
         Parameters
         ----------
@@ -176,13 +176,13 @@ class FixedContacts:
         return Relaxation(value=value, multipliers=multipliers, losses=losses)
 
     def relaxed(self) -> float:
-        """Return what the relaxation is worth: a corner, from which the search sets out."""
+        """Return the worth of a corner of the relaxation, which becomes the start for ``plan``."""
         point = self._cut(TUNING.several, self._engine.corner)
         self._point = None if point is None else point.columns
         return -np.inf if point is None else point.value
 
     def turn_aside(self, rng: np.random.Generator) -> None:
-        """Move to another corner of the relaxation, worth about as much."""
+        """Move to another corner of the relaxation that is worth about as much."""
         worth = np.concatenate(self._model.program.worth)
         self._engine.weigh(worth * (1.0 + TUNING.trifle * rng.random(len(worth))))
         point = self._engine.corner()
@@ -190,7 +190,7 @@ class FixedContacts:
         self._engine.weigh(worth)
 
     def fix(self, contacts: tuple[int, ...]) -> None:
-        """Fix other contacts than so far, all known to the program."""
+        """Fix other contacts from now on, all of them known to the program."""
         self._fixed = contacts
         self._hold(self._engine)
 
@@ -213,7 +213,7 @@ class FixedContacts:
         return is_fixed
 
     def _limit(self, is_fixed: Bools) -> None:
-        """Fix tasks, and let rows alone limit the collects, so that they get all multipliers."""
+        """Fix tasks, and let only rows limit collects, so that rows get all of the dual values."""
         program, m = self._model.program, len(is_fixed)
         lower, upper = np.concatenate(program.lower), np.concatenate(program.upper)
         if self._model.paid is None:
@@ -223,7 +223,7 @@ class FixedContacts:
         program.lower, program.upper = [lower], [upper]
 
     def _cut(self, rounds: int, solve: Callable[[], _Point | None]) -> _Point | None:
-        """Return the optimum of the relaxation with clique cuts, if there is one."""
+        """Add clique cuts for a few rounds; return the optimum of the relaxation, if any."""
         for left in range(rounds, -1, -1):
             point = solve()
             if point is None or left == 0 or not self._add_cuts(point.columns):
@@ -245,7 +245,7 @@ class FixedContacts:
         return is_cut
 
     def plan(self, at_least: float, *, is_rounded: bool = False) -> Plan | None:
-        """Return a plan worth ``at_least`` if one turns up soon, or else any, or None.
+        """Return a plan worth ``at_least`` if one is found soon, else any plan found, or None.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
-"""What images earn by the contact that brings them down, where they are worth less as they age.
+"""What images earn by the contact that brings them down, if they are worth less as they age.
 
-An image earns at most what it would if it came down as its contact begins. Each contact brings down
-as much as it can, in parts of images too; those after the first few count as the first of them.
-That no image overtakes another on its way is left out. So no plan earns more than the program says.
+An image earns at most what it would if it came down when its contact begins. Each contact brings
+down as much as it can, in parts of images too; all contacts after the next few count as the first
+of them. The order of images is left out. So no plan earns more than the program allows.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from planner_core.worth import share_earned
 def add_deliveries(
     program: Program, problem: Problem, taken: Ints, may_come: Ints, on_board: Floats
 ) -> None:
-    """Let images earn what they do beyond their worth on board.
+    """Add what images earn beyond their worth on board.
 
     Parameters
     ----------
     taken
         The columns x. Shape ``(n,)``.
     may_come
-        Columns that no image comes down beyond, x where there is no other. Shape ``(n,)``.
+        Columns that limit what comes down of each image; x if there is no other. Shape ``(n,)``.
     on_board
-        What each image earns that stays on board. Shape ``(n,)``.
+        What each image earns if it stays on board. Shape ``(n,)``.
     """
     for satellite in problem.satellites:
         _add_satellite(program, problem, satellite, taken, may_come, on_board)
@@ -74,7 +74,7 @@ def _add_satellite(
 
 
 def _next_contacts(end_s: Floats, start_s: Floats) -> tuple[Ints, Ints, Bools]:
-    """Return pairs of images and contacts after them, and whether one stands for itself alone."""
+    """Return pairs of images and later contacts, and whether the contact stands for itself only."""
     first = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S)
     place = first[:, None] + np.arange(NEXT_CONTACTS + 1)
     image, nth = np.nonzero(place < len(start_s))

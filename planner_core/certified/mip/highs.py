@@ -1,4 +1,4 @@
-"""HiGHS, asked to solve a program under a budget: quiet, single-threaded and repeatable."""
+"""HiGHS, run on a program under a budget: quiet, single-threaded and repeatable."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from planner_core.certified.sizes import LARGE_PROGRAM, LOG_CHARACTERS, PAUSE_S,
 from planner_core.certified.tolerances import CHAINED, NEARLY, NOTHING, SAME
 from planner_core.problem import Floats, Ints
 
-# Sums of zeros and ones bear HiGHS's usual tolerance. In a long chain of levels each row may
-# be off by as much, so there it must be far below one task.
+# HiGHS's usual tolerance suits sums of zeros and ones. In a long chain of levels each row may be
+# off by that much, so there it must be far below one task.
 
 
 Watch = Callable[[float, float], None]
-"""Called now and then with the best objective so far and the bound."""
+"""Called repeatedly with the best objective so far and the bound."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outcome:
-    """What a run left.
+    """The result of a run.
 
     Attributes
     ----------
     columns
         The best integer point found, or None. Shape ``(num_columns,)``.
     bound
-        No point is worth more; infinite where nothing is known yet.
+        No point is worth more; infinite if nothing is known yet.
     is_infeasible
         Whether it is proven that there is no point at all.
     log
-        The end of what HiGHS had to say.
+        The end of HiGHS's log.
     """
 
     columns: Floats | None
@@ -48,9 +48,9 @@ class Outcome:
 class Engine:
     """One program in HiGHS: relaxations first, then the integer search.
 
-    HiGHS runs in a thread of its own. A spent budget asks it to stop, and it does when it
-    comes to ask; who waits for an answer need not wait for that. What is then left behind is
-    never touched again, and the thread ends with its next question.
+    HiGHS runs in its own thread. Once the budget is spent it stops at its next callback, for which
+    callers wait only briefly. If that does not suffice, the run is abandoned and never touched
+    again, and its thread ends at that callback.
     """
 
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
@@ -90,48 +90,48 @@ class Engine:
         status = self._highs.addRows(
             len(rows), rows.lower, rows.upper, len(rows.column), rows.first, rows.column, rows.value
         )
-        # It takes none of them where a row names a column twice.
+        # HiGHS adds none of them if a row names a column twice.
         assert status != highspy.HighsStatus.kError
 
     def hold(self, columns: Ints, values: Floats) -> None:
-        """Fix some columns anew."""
+        """Fix some columns at these values."""
         self._highs.changeColsBounds(len(columns), columns, values, values)
 
     def relaxed(self) -> Floats | None:
         """Return the best fractional point, or None if the budget did not suffice.
 
-        Large programs begin by the interior point method, and go on from the corner next to where
-        it ends: with turns to the sun 0.6 and 0.8 s where the simplex method alone takes 7.3 and
-        3.1 (6,000 columns). With 3,000 it takes half as long, or twice.
+        Large programs start with the interior point method, and continue from the corner next to
+        its result: with turns to the sun this takes 0.6 and 0.8 s, the simplex method alone 7.3 and
+        3.1 s (6,000 columns). With 3,000 columns it takes half as long, or twice.
         """
         is_large = self._num_columns > LARGE_PROGRAM and not self._highs.getBasis().valid
         self._highs.setOptionValue("solver", "ipm" if is_large else "choose")
         if not self._run():
             return None
-        # With a named solver HiGHS would leave out that columns are whole.
+        # With a named solver HiGHS would ignore that columns are integer.
         self._highs.setOptionValue("solver", "choose")
         if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
         info = self._highs.getInfo()
-        # The duals prove the value but for what HiGHS tolerates of them, on columns up to one.
+        # The duals prove the value up to the infeasibility HiGHS tolerates, on columns up to one.
         doubt = float(info.sum_dual_infeasibilities) + SAME + self._left_out
         self._bound = min(self._bound, float(info.objective_function_value) + doubt)
         return np.array(self._highs.getSolution().col_value)
 
     @property
     def bound(self) -> float:
-        """What no point exceeds, as far as the relaxations have shown."""
+        """What no point exceeds, as the relaxations so far have shown."""
         return self._bound
 
     @property
     def row_duals(self) -> Floats:
-        """What the last relaxation would gain by one more of each row's limit."""
+        """What the last relaxation would gain per unit of each row's limit."""
         multipliers: Floats = np.abs(np.array(self._highs.getSolution().row_dual))
         return multipliers
 
     @property
     def log(self) -> str:
-        """What HiGHS had to say: the end of it, which holds the result."""
+        """The end of HiGHS's log, which holds the result."""
         return "".join(self._messages)[-LOG_CHARACTERS:]
 
     def search(
@@ -148,18 +148,17 @@ class Engine:
         Parameters
         ----------
         start
-            Values of the first columns of a point that is known, all integer ones among them;
-            or a fractional one, near which HiGHS looks first; or None.
+            Values of the first columns of a known point, all integer columns among them; or a
+            fractional point, near which HiGHS looks first; or None.
         gap
             Relative distance of objective and bound at which to stop.
         heuristic_effort
-            Share of the work spent on looking for points rather than on the proof; None for what
-            HiGHS does by itself.
+            Share of the work spent on looking for points rather than on the proof; None for
+            HiGHS's default.
         max_nodes
-            How many parts of the search to look at; unlike a limit in seconds, the same
-            everywhere.
+            Limit on branch-and-bound nodes; unlike a limit in seconds, the same everywhere.
         unit
-            An amount of which what any point is worth is a multiple, about; 0 where there is none.
+            Amount of which every point's worth is a multiple, approximately; 0 if there is none.
         """
         if self._is_abandoned:
             # HiGHS is still in its last relaxation, and must not be touched.
@@ -175,8 +174,8 @@ class Engine:
             highs.setOptionValue("mip_heuristic_effort", heuristic_effort)
         if max_nodes is not None:
             highs.setOptionValue("mip_max_nodes", max_nodes)
-        # Where it is not whole HiGHS begins with a program of its own over what is whole, which
-        # tells bounds too. They hold for nothing else.
+        # From a fractional start HiGHS first solves a sub-program with its whole values fixed, and
+        # reports that one's bounds too, which do not hold for the program itself.
         is_whole = start is not None and bool(np.all(start[integer] == np.round(start[integer])))
         if start is not None:
             highs.setSolution(len(start), np.arange(len(start), dtype=np.int32), start)
@@ -210,10 +209,10 @@ class Engine:
         return Outcome(columns=columns, bound=bound, is_infeasible=False, log=self.log)
 
     def _run(self) -> bool:
-        """Run HiGHS; return whether it ended in time, and may be asked what it found."""
+        """Run HiGHS; return whether it ended in time, so that its results may be read."""
         remaining_s = self._budget.remaining_s()
         if remaining_s is not None:
-            # HiGHS counts from its first run on.
+            # HiGHS's clock adds up all its runs.
             self._highs.setOptionValue("time_limit", self._highs.getRunTime() + remaining_s)
         # Not a daemon: the interpreter must not end under a thread that will call into it.
         thread = threading.Thread(target=self._highs.run, name="highs")
@@ -233,10 +232,10 @@ class Engine:
 
 
 def _noticeable(program: Program) -> tuple[Floats, float]:
-    """Return what columns are worth, and what those add at most whose worth is left out.
+    """Return the worths with tiny ones set to 0, and the most that those could have added.
 
-    HiGHS 1.15 loses its way among worths that are a 1e-17th of others: with images that earn so
-    little on board it called 0.768 the optimum where a plan earns 0.917.
+    HiGHS 1.15 fails on worths that are 1e-17 of others: with images that earn so little on board
+    it reported 0.768 as the optimum though a plan earns 0.917.
     """
     worth, lower, upper = map(np.concatenate, (program.worth, program.lower, program.upper))
     is_tiny = (worth != 0.0) & (np.abs(worth) < NOTHING * np.abs(worth).max(initial=0.0))

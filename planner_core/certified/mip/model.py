@@ -35,9 +35,8 @@ from planner_core.problem.restrict import restricted
 
 Formulation = Literal["antichain", "pairwise"]
 OnBoard = Literal["worth less", "priced", "worth the same"]
-"""What images that stay on board do: each has a column that says so, and others for when it comes
-down if it ages; or what a recorder holds at the end has one multiplier; or they are worth the most
-they can."""
+"""How images that stay on board count: each image has a column for coming down, and more for when
+if it ages; or all data left on board at the end has one cost per unit; or they lose nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,12 +48,12 @@ class PlanProgram:
     problem
         The opportunities that a plan may take.
     taken, down
-        The columns x, and those that say that an image comes down, which follow them; -1 where that
-        makes no difference. Shape ``(n,)``.
-    orders
-        For each satellite, which of its tasks can stand in one plan.
+        The columns x, and those after them for images that come down; -1 if that makes no
+        difference to the image. Shape ``(n,)``.
+    precedences
+        For each satellite, which of its tasks can be in one plan.
     paid
-        What the columns beside x are paid for; None where x is paid itself.
+        The groups of images whose columns carry the worth; None if x carries it.
     """
 
     problem: Problem
@@ -65,7 +64,7 @@ class PlanProgram:
     paid: Paid | None
 
     def target_multipliers(self, row_duals: Floats) -> Floats:
-        """Return what a relaxation says that each target is worth by itself.
+        """Return the targets' multipliers, from the row duals of a relaxation.
 
         Rows of targets come first in the program.
         """
@@ -79,15 +78,15 @@ class PlanProgram:
 
 
 class Paid(NamedTuple):
-    """Images that are paid alike: those of one target that are worth the same.
+    """Groups of images that are paid alike: those of one target that are worth the same.
 
     Attributes
     ----------
     target, worth, lost
-        Of each group, the last where its image stays on board; a target without images has one of
-        them too, worth nothing. Shape ``(num_groups,)``.
+        Target and worth of each group, and the part of it lost if the image stays on board. A
+        target without images has one group, worth nothing. Shape ``(num_groups,)``.
     rows, offsets
-        Their images, group by group, and where each group begins.
+        Images group by group, and where each group begins.
         Shapes ``(num_images,)`` and ``(num_groups + 1,)``.
     """
 
@@ -99,7 +98,7 @@ class Paid(NamedTuple):
 
     @classmethod
     def of(cls, problem: Problem, lost: Floats) -> Paid:
-        """Return the groups of a problem, target after target."""
+        """Return the groups of a problem, in order of target."""
         rows, offsets = problem.target_opportunities
         empty = np.flatnonzero(np.diff(offsets) == 0)
         target = np.concatenate([problem.opportunities.site[rows], empty])
@@ -125,7 +124,7 @@ def plan_program(
     *,
     on_board: OnBoard = "worth less",
 ) -> PlanProgram:
-    """Return the program of the plans that take some of the tasks.
+    """Return the program of the plans over all or some of the tasks.
 
     Parameters
     ----------
@@ -134,7 +133,7 @@ def plan_program(
     rows
         The opportunities that a plan may take, ascending; all by default.
     on_board
-        What images do that stay on board.
+        How images that stay on board count.
     """
     terms = [
         resource_terms(problem, satellite, costs_left=on_board == "priced")
@@ -148,7 +147,7 @@ def plan_program(
     if on_board == "priced":
         problem = replace(problem, worth=worth_before_left(problem))
     if rows is not None:
-        # What a task costs depends on the tasks around it, taken or not.
+        # What a task costs depends on all tasks around it, taken or not, hence terms come first.
         is_kept = np.zeros(len(problem.opportunities), dtype=np.bool_)
         is_kept[rows] = True
         kept = [np.flatnonzero(is_kept[s.rows]).astype(np.int32) for s in problem.satellites]
@@ -174,7 +173,7 @@ def plan_program(
 def _variables(
     program: Program, problem: Problem, lost: Floats, *, ages: bool
 ) -> tuple[Ints, Ints, Paid | None]:
-    """Add x, 1 for what must be taken, which images come down, and what images are worth."""
+    """Add the columns x (1 for kept tasks), those for images that come down, and all worths."""
     table, worth = problem.opportunities, problem.worth - lost
     kept = np.zeros(len(table), dtype=np.bool_)
     kept[problem.kept_rows] = True
@@ -182,7 +181,7 @@ def _variables(
     if is_transitive(problem):
         useful = (problem.worth > 0.0) | ((table.kind == CONTACT) & problem.use_resources)
         useful |= kept
-        if ages:  # what an image earns beyond its worth on board hangs on its contact
+        if ages:  # what an image earns beyond its worth on board depends on its contact
             worth, lost = problem.worth - lost_on_board(problem), np.zeros(len(table))
         taken = program.add_columns(
             worth, lower=kept.astype(np.float64), upper=useful.astype(np.float64)
@@ -198,9 +197,9 @@ def _variables(
 
 
 def _binding_losses(problem: Problem) -> Floats:
-    """Return what each image is worth less that stays on board. Shape ``(n,)``.
+    """Return how much less each image is worth if it stays on board. Shape ``(n,)``.
 
-    Nothing where plans hold only such as come down, and where none can.
+    0 for satellites whose plans hold only images that come down, and for images that cannot.
     """
     lost = lost_on_board(problem)
     lost[lost <= SAME * problem.worth] = 0.0
@@ -211,7 +210,7 @@ def _binding_losses(problem: Problem) -> Floats:
 
 
 def _once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
-    """At most one collect of each target, over all satellites: others could not add to the best."""
+    """Allow one collect of each target over all satellites: more would earn nothing beyond it."""
     rows, offsets = problem.target_opportunities
     program.add_rows(Rows.of(offsets, taken[rows], upper=1.0))
 
@@ -219,9 +218,9 @@ def _once_per_target(program: Program, problem: Problem, taken: Ints) -> None:
 def _paid_for_the_best(
     program: Program, problem: Problem, taken: Ints, down: Ints, lost: Floats
 ) -> Paid:
-    """Pay for one image of each target that is taken, and comes down.
+    """Pay for one image of each target, and for its coming down, however many are taken.
 
-    A slow satellite may turn by way of a target that it has collected already.
+    A slow satellite may slew by way of a target that it has collected already.
     """
     paid = Paid.of(problem, lost)
     offsets = paid.offsets
@@ -240,7 +239,7 @@ def _paid_for_the_best(
 
 
 def _no_more_than(columns: Ints, others: Ints, offsets: Longs) -> Rows:
-    """Return rows that let each column be no more than a group of others comes to."""
+    """Return rows that limit each column to the sum of its group of others."""
     column = np.insert(others, offsets[1:], columns)
     value = np.insert(np.full(len(others), -1.0), offsets[1:], 1.0)
     return Rows.of(offsets + np.arange(len(offsets)), column, value, upper=0.0)
@@ -268,7 +267,7 @@ def _constraints(
 
 
 def _agility(program: Program, own: Ints, precedence: Precedence, formulation: Formulation) -> None:
-    """Tasks of one satellite that exclude each other: one of them at most."""
+    """Allow at most one of the tasks of a satellite that exclude each other."""
     if formulation == "pairwise":
         first, second = excluding_pairs(precedence)
         program.add_rows(Rows.aligned((own[first], 1.0), (own[second], 1.0), upper=1.0))
@@ -280,7 +279,7 @@ def _agility(program: Program, own: Ints, precedence: Precedence, formulation: F
 def _detours(
     program: Program, satellite: SatelliteProblem, own: Ints, precedence: Precedence
 ) -> None:
-    """Two tasks that do not follow directly need another in between that makes up for it."""
+    """Require, for two tasks that may not follow directly, a task in between that allows it."""
     direct = direct_precedence(satellite)
     if precedence.bits is direct.bits:
         return
@@ -293,7 +292,7 @@ def _detours(
 
 
 def _stations(program: Program, problem: Problem, taken: Ints) -> None:
-    """Let a station serve no more satellites at a time than it has antennas."""
+    """Limit the satellites that a station serves at a time to the number of its antennas."""
     groups = antenna_groups(problem)
     program.add_rows(
         Rows.at_most([taken[group.rows] for group in groups], [float(g.limit) for g in groups])

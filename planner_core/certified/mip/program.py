@@ -14,7 +14,7 @@ from planner_core.problem import Bools, Floats, Ints
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rows:
-    """Constraints ``lower <= sum of value * column <= upper``; entries lie row after row.
+    """Constraints ``lower <= sum of value * column <= upper``, with entries in order of row.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Rows:
         lower: Floats | float = -np.inf,
         upper: Floats | float = np.inf,
     ) -> Rows:
-        """Return rows from offsets of shape ``(num_rows + 1,)``; numbers stand for all alike."""
+        """Return rows from offsets of shape ``(num_rows + 1,)``; scalars hold for all of them."""
         num_rows = len(offsets) - 1
         return cls(
             first=offsets[:-1].astype(np.int32),
@@ -59,7 +59,7 @@ class Rows:
         lower: Floats | float = -np.inf,
         upper: Floats | float = np.inf,
     ) -> Rows:
-        """Return as many rows as each term has columns: row i sums the i-th of every term."""
+        """Return one row for each column of a term: row i sums the i-th column of every term."""
         num_rows = len(terms[0][0])
         column = np.column_stack([columns for columns, _ in terms]).ravel()
         values = [np.broadcast_to(np.asarray(v, dtype=np.float64), (num_rows,)) for _, v in terms]
@@ -69,7 +69,7 @@ class Rows:
 
     @classmethod
     def at_most(cls, groups: Sequence[Iterable[int]], limits: Sequence[float]) -> Rows:
-        """Return one row for each group of columns: no more of them than its limit."""
+        """Return one row for each group of columns, which limits their sum."""
         members = [np.fromiter(group, dtype=np.int32) for group in groups]
         offsets = np.concatenate([[0], np.cumsum([len(group) for group in members])])
         column = np.concatenate([np.empty(0, dtype=np.int32), *members])
@@ -77,14 +77,14 @@ class Rows:
 
     @classmethod
     def limited(cls, columns: Ints, values: Floats, group: Ints, limit: Ints, most: Floats) -> Rows:
-        """Return rows that let each group of columns come to at most a multiple of a column.
+        """Return rows that limit each group's sum of ``value * column`` by a multiple of a column.
 
         Parameters
         ----------
         group
             Of each column. Shape ``(num_columns,)``.
         limit, most
-            The column that limits each group, and how many times. Shape ``(num_groups,)``.
+            The column that limits each group, and its factor. Shape ``(num_groups,)``.
         """
         order = np.argsort(group, kind="stable")
         groups, counts = np.unique(group, return_counts=True)
@@ -129,11 +129,11 @@ class Program:
         return np.arange(self.num_columns - n, self.num_columns, dtype=np.int32)
 
     def tell_apart(self) -> None:
-        """Raise each worth by a hair of its own: bounds stay bounds, and sums are no multiples."""
+        """Raise each worth by a tiny amount of its own: bounds hold, and sums are no multiples."""
         worth = np.concatenate(self.worth)
         self.worth = [worth * (1.0 + UNLIKE * np.random.default_rng(0).random(len(worth)))]
 
     def add_rows(self, rows: Rows) -> None:
-        """Add constraints; none is no harm."""
+        """Add constraints, if there are any."""
         if len(rows):
             self.rows.append(rows)

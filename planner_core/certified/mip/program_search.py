@@ -1,10 +1,10 @@
 """Plans of a fleet under battery and recorder by mixed-integer programs, with contacts drawn.
 
-Near the best multipliers the relaxed plans of all satellites hold a few thousand tasks between
-them, and the best plans are made of those. With its contacts fixed the program over them is nearly
-tight, and HiGHS finds in seconds what no search from plan to plan does. Which contacts: those of a
-satellite's own best plan at multipliers that are off by a little, less what it can do without, one
-satellite after another where they share antennas. The relaxation tells good sets from others.
+Near the best multipliers the relaxed plans of all satellites hold a few thousand tasks together,
+and the best plans consist of those. With contacts fixed, the program over these tasks is nearly
+tight, and HiGHS finds in seconds what no search from plan to plan does. The contacts are those of
+each satellite's own best plan at slightly perturbed multipliers, less the needless ones, one
+satellite after another as they share antennas. The relaxation tells good sets from others.
 """
 
 from __future__ import annotations
@@ -33,29 +33,29 @@ from planner_core.solvers.sequential import blocked_rows
 
 
 class Costs(Protocol):
-    """What else is known of opportunities."""
+    """Estimates of what opportunities cost."""
 
     @property
     def losses(self) -> Floats:
-        """What taking each costs, about; infinite where no good plan does. Shape ``(n,)``."""
+        """Approximate cost of taking each; infinite if no good plan does. Shape ``(n,)``."""
 
 
 class ProgramSearch:
-    """Turns that seek plans for a pool.
+    """Steps that seek plans for a pool.
 
     Parameters
     ----------
     pool
-        Where plans come from, and go.
+        Where plans are taken from and added to.
     ascent
         Holds the satellites' programmes and the best multipliers.
     costs
-        Says what taking each opportunity costs, as far as that is known by then.
+        What taking each opportunity costs, as far as known at the time.
 
     Attributes
     ----------
     steps_beside
-        How many steps of the other search take about as long as the next turn.
+        How many steps of the other search take about as long as the next step here.
     """
 
     def __init__(
@@ -78,15 +78,15 @@ class ProgramSearch:
         self.steps_beside = next(self._work, 1)
 
     def step(self) -> None:
-        """Solve a program with the most hopeful contacts that are known, or that are drawn."""
+        """Solve a program with the most promising contacts, known or drawn."""
         self.steps_beside = next(self._work, 1)
 
     def _steps(self) -> Iterator[int]:
-        """Yield how long each turn will take, before it."""
+        """Yield how long each step will take, before it."""
         yield TUNING.steps_beside
         while not self._budget.is_spent():
             group = self._group()
-            # What satellites beside do stays the same, though the plan may change meanwhile.
+            # Tasks of the other satellites stay fixed, though the plan may change meanwhile.
             beside = self._tasks_beside(group)
             program = self._program(group, beside)
             before = self._pool.reward
@@ -105,7 +105,7 @@ class ProgramSearch:
     def _improve_best(
         self, program: FixedContacts, beside: Rows, sets: Sequence[Rows]
     ) -> Iterator[int]:
-        """Better the plan with the most hopeful of some sets of contacts."""
+        """Improve the plan with the most promising of some sets of contacts."""
         worth: dict[Rows, float] = {}
         for contacts in dict.fromkeys(sets):
             fixed = (*beside, *contacts)
@@ -115,7 +115,7 @@ class ProgramSearch:
             yield from self._improve(program, fixed)
 
     def _improve(self, program: FixedContacts, fixed: Rows) -> Iterator[int]:
-        """Better the plan with what is fixed, from one corner of the relaxation after another."""
+        """Improve the plan with these tasks fixed, from several corners of the relaxation."""
         program.fix(fixed)
         value = program.relaxed()
         num_tries = 0
@@ -139,7 +139,7 @@ class ProgramSearch:
         return group
 
     def _promising(self) -> Bools:
-        """Return tasks of which good plans are made: so many for each of the best plan."""
+        """Return the tasks of least loss: a fixed number for each task of the best plan."""
         losses = self._costs.losses
         num_offered = int(self._offered_per_task * len(self._pool.plan.actions))
         cut_off = np.sort(losses[np.isfinite(losses)])[:num_offered].max(initial=0.0)
@@ -147,11 +147,11 @@ class ProgramSearch:
         return promising
 
     def _known(self) -> tuple[Rows, Rows]:
-        """Return the best plan, and the latest one of the other search."""
+        """Return the tasks of the best plan, and of the latest one of the other search."""
         return rows_of(self._pool.plan), self._pool.latest
 
     def _program(self, group: Bools, beside: Rows) -> FixedContacts:
-        """Return the program of some satellites, beside what the others do."""
+        """Return the program of some satellites, with the others' tasks fixed."""
         offered = self._promising()
         offered[[*chain(*self._known())]] = True
         offered &= group[self._problem.opportunities.satellite]
@@ -160,12 +160,12 @@ class ProgramSearch:
         )
 
     def _tasks_beside(self, group: Bools) -> Rows:
-        """Return what the plan has the other satellites do."""
+        """Return the tasks of the plan on the other satellites."""
         of = self._problem.opportunities.satellite
         return tuple(row for row in rows_of(self._pool.plan) if not group[of[row]])
 
     def _contacts(self, group: Bools, rows: Sequence[int] | None = None) -> Rows:
-        """Return the contacts of some satellites, of all or among some opportunities."""
+        """Return the contacts of some satellites, all or those among ``rows``."""
         table = self._problem.opportunities
         is_one = (table.kind == CONTACT) & group[table.satellite]
         if rows is not None:
@@ -199,7 +199,7 @@ class ProgramSearch:
         return tuple(drawn)
 
     def _needed_contacts(self, network: Network, path: Ints) -> Ints:
-        """Return contacts of a path without which the recorder would hold more than with all."""
+        """Drop contacts of a path while its recorder overflows no more; return the others."""
         most = _overflow(network, path)
         for contact in self._rng.permutation(path[network.is_contact[path] != 0]):
             less = path[path != contact]
@@ -210,7 +210,7 @@ class ProgramSearch:
 
 
 def _overflow(network: Network, path: Sequence[int] | Ints) -> float:
-    """Return by how much the recorder passes its limits on a path, at most; 0 if it does not."""
+    """Return the most by which the recorder exceeds its limits on a path; 0 if it does not."""
     data, most, end = network.data_start, 0.0, network.data_end
     for k in path:
         most = max(most, data - network.data_before[k])

@@ -1,8 +1,8 @@
-"""Windows of a plan planned anew, contacts with images, by small mixed-integer programs.
+"""Windows of a plan replanned, contacts and images together, by small mixed-integer programs.
 
-Searches that move images leave contacts where they are, and those that move contacts settle what
-images earn before. Where images age both hang on each other. In a window of some hundred
-opportunities of all satellites, what is outside as it is, HiGHS decides about them together.
+Searches that move images leave contacts where they are, and those that move contacts first settle
+what images earn. If images age, each depends on the other. HiGHS decides both together in a window
+of some hundred opportunities of all satellites, with the rest of the plan unchanged.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from planner_core.problem.plan import Plan
 
 
 class ProgramWindows:
-    """Plans that differ from others in one window, drawn at random."""
+    """Replans random windows of a plan."""
 
     def __init__(self, problem: Problem, budget: Budget, seed: int) -> None:
         self._problem, self._budget, self._seed = problem, budget, seed
@@ -27,7 +27,7 @@ class ProgramWindows:
         self._by_start = np.argsort(problem.opportunities.start_s, kind="stable")
 
     def move(self, plan: Plan, num_tasks: int) -> Plan:
-        """Return the plan with a window of so many opportunities planned anew."""
+        """Return the plan with a window of ``num_tasks`` opportunities replanned."""
         problem, open_ = self._problem, self._window(num_tasks)
         own = np.zeros_like(open_)
         own[[action.opportunity for action in plan.actions]] = True

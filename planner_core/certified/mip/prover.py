@@ -1,4 +1,4 @@
-"""HiGHS on what the multipliers leave open: a plan worth an amount, or the proof of none."""
+"""HiGHS on the tasks that the multipliers leave open: a plan worth an amount, or proof of none."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from planner_core.problem.plan import Plan
 class Prover(Engine):
     """The program of the plans worth at least ``amount``; one worth ``enough`` ends the search.
 
-    ``program`` counts in the greatest reward of ``problem``, and its columns begin with x.
+    ``program`` counts worth in units of the greatest of ``problem``; its first columns are x.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Prover(Engine):
     ) -> tuple[Plan | None, float]:
         """Return a plan worth the amount, if there is one, and what no plan exceeds.
 
-        The bound is infinite where the budget did not suffice for any.
+        The bound is infinite if the budget did not suffice for one.
         """
         outcome = self.search(None, 0.0, heuristic_effort, watch, max_nodes)
         plan = None

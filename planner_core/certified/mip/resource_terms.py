@@ -1,4 +1,4 @@
-"""The coefficients of the rows of one satellite's battery and recorder (``resources.py``)."""
+"""Coefficients of the rows for one satellite's battery and recorder (``resources.py``)."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from planner_core.problem import (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Given:
-    """What is given back where two tasks leave no time at the sun; shape ``(num_pairs,)``.
+    """Energy given back to pairs of tasks with no time at the sun; shape ``(num_pairs,)``.
 
-    Each task pays for its turns to the sun and back, as if it always went there. Of two tasks
-    that follow each other sooner the charge between them would be negative.
+    Each task pays for its turns to the sun and back as if they always took place. Between two tasks
+    that follow each other sooner, the charge would be negative, which this makes up for.
 
     Attributes
     ----------
     first, second
         The tasks.
     amount
-        Of the battery.
+        In battery capacities.
     """
 
     first: Ints
@@ -39,7 +39,7 @@ class Given:
     amount: Floats
 
     def of_part(self, rows: Ints, num_tasks: int) -> Given:
-        """Return the pairs among some of the tasks."""
+        """Return the pairs of which both tasks are in ``rows``."""
         new_row = np.full(num_tasks, -1, dtype=np.int32)
         new_row[rows] = np.arange(len(rows))
         first, second = new_row[self.first], new_row[self.second]
@@ -54,33 +54,33 @@ NOTHING_GIVEN: Final = Given(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResourceTerms:
-    """The coefficients of one satellite's rows, by task; fractions of capacity, shape ``(m,)``.
+    """Coefficients of one satellite's rows, by task; fractions of capacity, shape ``(m,)``.
 
     Attributes
     ----------
     energy_cost, cap_cost
         What taking a task costs, and what a full battery loses by it.
     full
-        Level of a full battery before the task, where it is not taken; less by what ``cap_cost``
-        is above the cost where it is.
+        Level of a full battery before the task if it is not taken; if it is, lower by the excess of
+        ``cap_cost`` over ``energy_cost``.
     battery_floor, battery_floor_taken
-        Lowest level after the task: in any case, and where it is taken.
+        Lowest level after the task: in any case, and if it is taken.
     data_gain
-        What taking a task records (or, negative, takes down).
+        What taking a task records (or, if negative, takes down).
     recorder_floor, recorder_floor_taken
-        Level of an empty recorder; contacts cannot take down more than that.
+        Level of an empty recorder, below which contacts cannot bring it: in any case, and if taken.
     recorder_top
         Highest level until the next task begins.
     recorder_top_first
         Highest level before the first task.
     given
-        What is given back to pairs of tasks.
+        Energy given back to pairs of tasks.
     delivered
-        Highest level at the end with each task as the last image, where images must come down.
+        Highest level at the end with each task as the last image, if images must come down.
     comes_down
-        The same for each image to be on the ground, where some may stay on board.
+        Highest level at the end with each image on the ground, if some may stay on board.
     left_cost
-        What a full recorder costs at the end, of worth.
+        Cost of a full recorder at the end, in worth.
     """
 
     energy_cost: Floats
@@ -99,10 +99,10 @@ class ResourceTerms:
     left_cost: float = 0.0
 
     def of_part(self, rows: Ints) -> ResourceTerms:
-        """Return the terms where only some of the tasks may be taken, in ascending order.
+        """Return the terms if only some of the tasks, in ascending order, may be taken.
 
-        Limits of the others hold on: those of the battery loosen as time goes on, so that the
-        tasks before have the tighter ones, and those of the recorder tighten.
+        Limits of the others still hold. Those of the battery loosen with time, so that tasks before
+        have tighter ones; those of the recorder tighten, and go over to the task before.
         """
         if len(rows) == 0:
             return self._at(rows)
@@ -128,7 +128,7 @@ def resource_terms(
     Parameters
     ----------
     costs_left
-        Whether what stays on board has a multiplier, as in the other searches (``left_cost``).
+        Whether data left on board costs worth, as in the other searches (``left_cost``).
     """
     terms = (
         physical_terms(problem, satellite)
@@ -145,7 +145,7 @@ def resource_terms(
 
 
 def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTerms:
-    """Return the terms of ``dynamics: physical``: time outside tasks charges, but for turns."""
+    """Return the terms of ``dynamics: physical``: time outside tasks and turns charges."""
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s
     is_contact = satellite.kind == CONTACT
@@ -159,8 +159,8 @@ def physical_terms(problem: Problem, satellite: SatelliteProblem) -> ResourceTer
     floor = r.battery_min_fraction + idle.reserve - charged_from
     next_s = np.append(start_s[1:], problem.horizon_s)
     emptied = np.where(is_contact, -r.telemetry_per_s * end_s, np.inf)
-    # Who leaves the sun for a later task may do so before the turn to this one would begin: what
-    # is not taken caps the battery by what comes after it, too.
+    # A satellite may leave the sun for a later task before the turn to this one would begin: a task
+    # that is not taken must not cap the battery below what later ones allow.
     full = idle.full - charged_to
     full_untaken = np.maximum.accumulate(full[::-1])[::-1]
     return ResourceTerms(
@@ -222,7 +222,7 @@ def _floor_of_any(
     if not r.knows_free_charge_alone:
         start = min(r.initial_battery_fraction, r.battery_min_fraction)
         return np.minimum.accumulate(np.minimum(floor, start))
-    # Idle time only charges: what may still run at each start has the lowest level.
+    # Idle time only charges: the lowest level at each start is that of a task that may still run.
     latest = charged_to.copy()
     over = np.searchsorted(satellite.start_s, satellite.end_s)
     for row in range(len(satellite)):
@@ -231,7 +231,7 @@ def _floor_of_any(
 
 
 def _given(satellite: SatelliteProblem, idle: IdleEnergy) -> Given:
-    """Return what pairs of tasks get back that leave no time at the sun."""
+    """Return the energy given back to pairs of tasks with no time at the sun in between."""
     if satellite.resources.sun_pointing == "free":
         return NOTHING_GIVEN
     precedence = direct_precedence(satellite)

@@ -1,22 +1,22 @@
 """Battery and recorder of one satellite as linear rows, exact for both dynamics.
 
-More energy and less data never hurt a plan, so the end stops need no binary choice: the
-battery is *at most* what flows in allows and at most full, the recorder *at least* what
-flows in and at least empty. Each task is booked whole at its start, as in
+More energy and less data never hurt a plan, so saturation at full and empty needs no binary
+columns: the battery is *at most* what flows in allows and at most full, the recorder *at least*
+what flows in and at least empty. Each task is booked whole at its start, as in
 ``planner_core.mdp.track``.
 
-The columns hold levels less what idle time adds up to (charge of all sunlit seconds so far,
-telemetry of all seconds so far). Idling is then free, and a level changes at tasks only:
+The columns hold levels net of idle time (charge of all sunlit seconds so far, telemetry of all
+seconds so far). Idling is then free, and a level changes at tasks only:
 
 * ``E[k] <= E[k-1] - energy_cost[k] * x[k]``, ``E[k] + cap_cost[k] * x[k] <= full[k]``;
-* ``G[k] >= G[k-1] + data_gain[k] * x[k]``, ``G[k] >= empty[k]`` where k is a contact;
-* and the limits, for the instants at which the booked level is the lowest (or highest) one.
+* ``G[k] >= G[k-1] + data_gain[k] * x[k]``, ``G[k] >= empty[k]`` if k is a contact;
+* and the limits, at the instants when the booked level is lowest (or highest).
 
 Images come down in the order in which they were taken. So one is on the ground at the end if the
 recorder then holds no more than what was recorded after it (``_add_shares``).
 
 A task that still runs when the next could begin has been booked whole, while some of its
-sunlight and telemetry is yet to come. Where it begins the limits allow for that.
+sunlight and telemetry is yet to come. The limits at the next task's start allow for that.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def add_resources(
     taken
         Their columns x. Shape ``(m,)``.
     down
-        The columns that say that an image comes down; -1 where there is none. Shape ``(m,)``.
+        The columns for images that come down; -1 for none. Shape ``(m,)``.
     margin
-        How far inside the strict limits to stay; negative to let them be touched.
+        How far inside the strict limits to stay; negative to let plans touch them.
     """
     _add_battery(program, satellite, terms, taken, margin)
     level = _add_recorder(program, satellite, terms, taken, margin)
@@ -91,11 +91,11 @@ def _add_battery(
 def _add_changes(
     program: Program, terms: ResourceTerms, level: Ints, before: Ints, taken: Ints
 ) -> None:
-    """Let each task take its cost, less what it and one other task are given back.
+    """Charge each task its cost, less what is given back to it and another task as a pair.
 
-    A task gets back from one before it and from one after it at most. Between two that do not
-    follow each other there is less to get than from those in between, so that it need not be
-    known which are neighbours.
+    A task is in at most one pair with a task before it and one with a task after it. A pair of
+    tasks that are not neighbours gets less than those with the tasks in between would, so that the
+    program need not know which are neighbours.
     """
     given, m = terms.given, len(taken)
     back = program.add_columns(np.zeros(len(given.amount)), is_integer=False)
@@ -147,9 +147,9 @@ def _add_recorder(
 def _add_delivery(
     program: Program, satellite: SatelliteProblem, delivered: Floats, level: Ints, taken: Ints
 ) -> None:
-    """Let no image be taken that does not come down.
+    """Allow only images that come down.
 
-    Without images nothing is written but telemetry, and the level is that of the start or below.
+    Without images only telemetry is recorded, and the net level is at most that of the start.
     """
     images = np.flatnonzero(satellite.kind == COLLECT)
     highest = max(satellite.resources.initial_recorder_fraction, float(delivered.max()))
@@ -163,7 +163,7 @@ def _add_shares(
 ) -> None:
     """Let an image come down only if all that the recorder holds at the end was recorded after it.
 
-    How much that is has a column of its own for each image, so that rows stay short.
+    The data recorded after each image has its own column, so that rows stay short.
     """
     images = np.flatnonzero(down >= 0)
     if len(images) == 0 or terms.comes_down is None:

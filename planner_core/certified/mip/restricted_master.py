@@ -1,4 +1,4 @@
-"""The relaxation of a problem without resources, in HiGHS, with its cutting planes."""
+"""The restricted master problem in HiGHS: a relaxation without resources, with cutting planes."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from planner_core.problem import (
 class Master(Engine):
     """Which tasks to take, fractionally: exclusion sets, zero-half cuts, and their multipliers.
 
-    Paths are not in it: sets of tasks of one satellite that exclude each other say as much,
-    and those that matter are few.
+    It has no columns for paths: sets of tasks of one satellite that exclude each other express the
+    same, and few of them matter.
 
     Parameters
     ----------
     rows
-        For each opportunity of the problem its row in the problem that is to be proven.
+        Row of each opportunity in the problem whose bound is to be proven.
     """
 
     def __init__(self, problem: Problem, rows: Ints, budget: Budget, seed: int) -> None:
@@ -60,18 +60,18 @@ class Master(Engine):
         self._useful = worth > 0.0
         program.add_columns(worth, upper=self._useful.astype(np.float64))
         program.add_rows(Rows.of(self._sets.offsets, self._sets.members, upper=1.0))
-        # For each row of the program the sets that it adds up, and how long it has lain idle.
+        # The sets that each row of the program adds up, and for how long the row has been idle.
         self._row_sets: list[tuple[int, ...]] = [(i,) for i in range(len(self._sets.offsets) - 1)]
         self._idle = [0] * len(self._row_sets)
         super().__init__(program, budget, seed, is_chained=False)
 
     @property
     def value(self) -> float:
-        """Return what the last relaxation is worth."""
+        """Value of the last relaxation."""
         return float(self._highs.getInfo().objective_function_value) * self._scale
 
     def multipliers(self) -> Multipliers:
-        """Return the multipliers that the last relaxation has put on targets and cuts."""
+        """Return the multipliers of targets and cuts from the last relaxation's dual values."""
         rows = self._rows
         multiplier = self.row_duals * self._scale
         multipliers = multiplier[: self._num_targets].copy()
@@ -91,14 +91,14 @@ class Master(Engine):
         return Multipliers(of_targets=multipliers, cuts=tuple(cuts), of_cuts=tuple(of_cuts))
 
     def allow(self, is_open: Bools) -> None:
-        """Allow these tasks, and no others, from now on."""
+        """Allow only these tasks from now on."""
         n = len(self._useful)
         upper = self._useful & is_open
         columns = np.arange(n, dtype=np.int32)
         self._highs.changeColsBounds(n, columns, np.zeros(n), upper.astype(np.float64))
 
     def cut(self, taken: Floats, *, with_zero_half_cuts: bool) -> int:
-        """Add what the fractional plan breaks, drop what has long been idle; return what came."""
+        """Add cuts that the fractional plan violates, drop idle ones; return the number added."""
         self._drop_idle()
         num_before = len(self._row_sets)
         picked = self._zero_half_cuts(taken) if with_zero_half_cuts else []
@@ -121,7 +121,7 @@ class Master(Engine):
         return len(self._row_sets) - num_before
 
     def program(self, is_open: Bools) -> Program:
-        """Return all that the relaxation holds, for some of the tasks: exact if transitive."""
+        """Return the relaxation's program for some of the tasks: exact if transitive."""
         number = np.cumsum(is_open) - 1
         program = Program()
         program.add_columns(self._worth[is_open], upper=self._useful[is_open].astype(np.float64))
@@ -156,7 +156,7 @@ class Master(Engine):
         )
 
     def _zero_half_cuts(self, taken: Floats) -> list[tuple[int, ...]]:
-        """Return the deepest cuts, not too many of them about the same tasks."""
+        """Return the deepest zero-half cuts, not too many of them on the same tasks."""
         depth_of: dict[tuple[int, ...], float] = {}
         for _ in range(TUNING.several):
             chosen = zero_half_cuts(self._sets, taken, self._draws)
@@ -183,7 +183,7 @@ class Master(Engine):
 
 
 def _exclusion(precedence: Precedence, site: Ints, kind: np.ndarray) -> Precedence:
-    """Return an order without the pairs of tasks on one target: those exclude each other too."""
+    """Return the precedence without pairs of tasks on one target, which exclude each other too."""
     return precedence._replace(
         bits=_without_equals(precedence, np.where(kind == COLLECT, site, -1))
     )

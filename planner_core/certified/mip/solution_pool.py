@@ -1,8 +1,8 @@
-"""Plans that were found in different ways, merged into better ones.
+"""Plans from different searches, merged into better ones.
 
-Each search ends in plans of its own, which no small change betters. The mixed-integer program over
-the tasks of a dozen of them, with the contacts of one, is small, and HiGHS finds within a second
-what they are worth together: an image or two more than the best, again and again.
+Each search ends in plans that no small change improves. The mixed-integer program over the tasks of
+a dozen of them, with the contacts of one, is small, and HiGHS solves it within a second: the merged
+plan often has an image or two more than the best.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ Rows = tuple[int, ...]
 
 
 class PlanPool:
-    """Plans, the best of them, and merging.
+    """Known plans, the best of them, and merging.
 
     Attributes
     ----------
     plan, reward
         The best valid plan, and what it is worth.
     latest
-        The tasks of the plan that another search is at; it may be none.
+        The tasks of another search's current plan, valid or not; empty at first.
     """
 
     def __init__(self, problem: Problem, budget: Budget, seed: int) -> None:
         self._problem, self._budget, self._seed = problem, budget, seed
         self._rng = np.random.default_rng(seed)
         self._gain = reward_unit(problem)
-        # Valid plans by their tasks, the newest last, and what they are worth.
+        # Worth of valid plans by their tasks, newest last.
         self._worth: dict[Rows, float] = {}
         self._num_merged = 0
         self.plan, self.reward = Plan(), 0.0
@@ -46,11 +46,11 @@ class PlanPool:
 
     @property
     def better(self) -> float:
-        """What a better plan is worth at least."""
+        """The least that a better plan is worth."""
         return self.reward + max(self._gain, SAME * self.reward)
 
     def learn(self, ended: Iterable[Plan], latest: Plan) -> None:
-        """Note the plans that another search has ended with, and the one that it is at."""
+        """Note the plans that another search has ended with, and its current one."""
         for plan in ended:
             self.add(plan)
         self.latest = rows_of(latest)
@@ -62,10 +62,10 @@ class PlanPool:
             self._worth[rows_of(plan)] = worth
 
     def merge(self) -> None:
-        """Seek a better plan of what the best and the newest ones do.
+        """Seek a better plan over the tasks of the best and the newest plans.
 
-        With the contacts of the best, and of another. Where no plan has been noted since the last
-        time there is nothing to do.
+        Tries the contacts of the best plan, and those of another. Does nothing if no plan has been
+        noted since the last call.
         """
         if len(self._worth) == self._num_merged:
             return
@@ -96,7 +96,7 @@ class PlanPool:
         return tuple(row for row in rows if kind[row] == CONTACT)
 
     def _judge(self, plan: Plan) -> float | None:
-        """Return what a plan is worth, None if it is not valid; take it if it is the best."""
+        """Return what a plan is worth, None if it is not valid; keep it if it is the best."""
         if (known := self._worth.get(rows_of(plan))) is not None:
             return known
         timeline = replay(self._problem, plan, in_detail=False)

@@ -1,8 +1,8 @@
-"""Cutting planes from odd numbers of sets of which a plan takes one task at most.
+"""Zero-half cuts: from odd numbers of sets of which a plan takes at most one task each.
 
-Add up 2k + 1 of such sets, halve and round down: of the tasks that stand in two of them or
-more (each as often as half its count), a plan takes k at most (zero-half cuts). Fractional
-plans often break that where they keep each set alone.
+Add up 2k + 1 such sets, halve and round down: of the tasks in two or more of the sets, each
+counted half as often as it is in them, rounded down, a plan takes at most k. Fractional plans
+often violate this though they satisfy each set alone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Sets(NamedTuple):
 
 @inner
 def _tight_sets(sets: Sets, taken: Floats, column_of: Ints) -> tuple[Ints, Floats]:
-    """Return the sets that hold fractional tasks and leave little room, and that room."""
+    """Return the sets with fractional tasks whose slack is not nearly 1, and that slack."""
     own = np.empty(len(sets.offsets) - 1, dtype=np.int32)
     slack = np.empty(len(own))
     m = 0
@@ -48,10 +48,10 @@ def _tight_sets(sets: Sets, taken: Floats, column_of: Ints) -> tuple[Ints, Float
 
 @kernel
 def zero_half_cuts(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
-    """Return odd numbers of sets whose cuts a fractional plan breaks.
+    """Return odd numbers of sets whose cuts a fractional plan violates.
 
-    Sets are added up modulo two so that one fractional task after another, the most taken
-    first, stands in an even number of them (Koster, Zymolka and Kutschka, 2009).
+    Sets are added modulo two so that one fractional task after another, most taken first, is in
+    an even number of them (Koster, Zymolka and Kutschka, 2009).
     """
     one = np.uint64(1)
     fractional = np.flatnonzero((taken > WHOLE) & (taken < 1.0 - WHOLE))
@@ -111,10 +111,10 @@ def zero_half_cuts(sets: Sets, taken: Floats, draws: Uint64s) -> Sets:
 def deepest(
     sets: Sets, chosen: Sets, taken: Floats, max_cuts: int, max_shared: int
 ) -> tuple[Ints, Floats]:
-    """Return the cuts that a fractional plan breaks most, and how far beyond them it lies.
+    """Return the cuts that a fractional plan violates most, and its distance from each.
 
-    The distance in the space of the tasks that it takes. No more than ``max_shared`` of the
-    cuts answered are about the same task.
+    Distances are in the space of the tasks that it takes. No fractional task is in more than about
+    ``max_shared`` of the cuts.
     """
     count = np.zeros(len(taken), dtype=np.int32)
     depth = np.zeros(len(chosen.offsets) - 1)
@@ -147,7 +147,7 @@ def deepest(
         for i in picked:
             for member in sets.members[sets.offsets[i] : sets.offsets[i + 1]]:
                 if WHOLE < taken[member] < 1.0 - WHOLE:
-                    # Whoever counts stands in two of the sets.
+                    # A task with a weight in the cut is in at least two of its sets.
                     shared[member] += 1
         found[m] = cut
         m += 1
