@@ -1,1 +1,1 @@
-"""Who does what when: one driver for each kind of problem."""
+"""The strategies of the certified search, for each kind of problem."""

@@ -1,8 +1,8 @@
 """Without resources: multipliers, window search, cutting planes, and HiGHS for what is left.
 
-Whatever the multipliers of targets and cuts, they tell of each task what a plan that holds it can
-earn at most. Tasks that no better plan can hold are struck out, so that the rest becomes ever
-smaller, for the search as well as for the proof.
+Any multipliers of targets and cuts give, for each task, the most that a plan with that task can
+earn. Tasks that no better plan can hold are struck out (reduced-cost fixing), so that fewer and
+fewer remain, for the search as well as for the proof.
 """
 
 from __future__ import annotations
@@ -67,27 +67,27 @@ class AgilitySearch:
 
     @property
     def refuted(self) -> float:
-        """What is known of plans once none is ``better``: they are worth no more than this."""
+        """What plans are worth at most once it is proven that none is ``better``."""
         return self.best.reward if self.best.unit else self.best.better
 
     def lower(self, value: float) -> None:
-        """Note that no plan is worth more, by the steps and what they refute."""
+        """Note that no plan is worth more than ``value``, by the steps and what they refute."""
         known = rounded_bound(self.problem, value, self.best.reward)
         self._certified = min(self._certified, known)
         self.best.lower(Bound(value=value, proof="lagrangian"))
 
     def step(self, step: Multipliers) -> None:
-        """Learn from multipliers: a bound, and of each open task what it can be part of."""
+        """Learn from multipliers: a bound, and the most that plans with each open task earn."""
         total, through = values_through(
             self.problem, self._network, self._rows, step, ~self.is_struck
         )
         before = self._certified
-        # Plans that hold what is struck out are worth less than a better one.
+        # Plans with struck tasks are worth less than a better one.
         self.lower(max(total, self.refuted))
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
-        # What is not kept must not be built upon.
+        # Only steps that are kept may lower values: the proof replays those alone.
         if self._certified < before or np.any(is_below(lower, self.best.better) > self.is_struck):
             self.steps.append(step)
             self.through = lower
@@ -98,20 +98,20 @@ class AgilitySearch:
         return is_below(self.through, self.best.better)
 
     def shrink(self) -> None:
-        """Leave out the tasks that no better plan can hold."""
+        """Remove the tasks that no better plan can hold."""
         keep = ~self.is_struck
         self._rows, self.through = self._rows[keep], self.through[keep]
         self._rest = restricted(self.problem, self._rows)
         self._network = network_of(self._rest)
 
     def ascend(self) -> None:
-        """Search for multipliers anew over what is open."""
+        """Search anew for multipliers, over the open tasks."""
         ascent = ascent_on_paths(self._rest, self._network, default_epochs(len(self._rows)), 0)
         ascent.run(self.best.reward, self.budget.stop)
         self.step(Multipliers(of_targets=ascent.multipliers))
 
     def ascend_on_passes(self, num_epochs: int) -> None:
-        """Search for multipliers by which no target is paid twice in one pass over it, so long."""
+        """Ascend for some epochs on paths that are paid for a target once in each pass."""
         if self._ascent is None:
             self._ascent = ascent_on_passes(self.problem, self.seed)
         self._ascent.improve(num_epochs, self.budget.stop)
@@ -123,7 +123,7 @@ class AgilitySearch:
 
     @property
     def is_small(self) -> bool:
-        """Whether what is open is little enough for cutting planes."""
+        """Whether few enough tasks are open for cutting planes."""
         is_dense = num_near_pairs(self._rest) > MAX_PAIRS
         return not is_dense and (
             not self.problem.offers_choice or len(self._rows) <= TUNING.most_relaxed
@@ -131,11 +131,11 @@ class AgilitySearch:
 
     @property
     def is_settled(self) -> bool:
-        """Whether multipliers of targets alone will not bring the bound down any more."""
+        """Whether multipliers of targets alone will lower the bound no further."""
         return self._ascent is not None and self._ascent.is_settled
 
     def search(self, moves_per_task: float, rows: Ints) -> bool:
-        """Search windows among some of the problem's tasks; return whether that helped."""
+        """Search windows among some of the tasks; return whether the best plan improved."""
         own = np.array([a.opportunity for a in self.best.plan.actions], dtype=np.int32)
         rows = np.union1d(rows, own).astype(np.int32)
         if self._windows is None or not np.array_equal(rows, self._window_rows):
@@ -148,7 +148,7 @@ class AgilitySearch:
             )
             self._window_rows = rows
         windows = self._windows
-        # A search that has wandered over equal plans goes on from where it is.
+        # A search that has wandered over equal plans continues from its own plan.
         if windows.reward < self.best.reward:
             windows.adopt(Plan.of(windows.problem, np.searchsorted(rows, own)))
         windows.make_moves(int(moves_per_task * len(rows)), self.budget)
@@ -157,14 +157,11 @@ class AgilitySearch:
         )
 
     def open_rows(self, amount: float) -> Ints:
-        """Return the tasks that a plan worth this much can hold."""
+        """Return the tasks that a plan worth ``amount`` can hold."""
         return self._rows[~is_below(self.through, amount)]
 
     def cut(self, max_rounds: int) -> Generator[None, None, Master]:
-        """Multiplier with cutting planes, a round at a time, until that leads no further.
-
-        Returns the relaxation.
-        """
+        """Add cutting planes, a round per slice, until they lead no further; return the master."""
         self.shrink()
         priced = self.best.bound.value + self.best.unit
         master = Master(self._rest, self._rows, self.budget, self.seed)
@@ -182,8 +179,8 @@ class AgilitySearch:
                 break
             master.allow(~self.is_struck)
             gap = max(bounds[-1] - self.best.better, 1e-9)
-            # Until paths are priced nearly as well as by the subgradient, zero-half cuts lead
-            # astray.
+            # Until the relaxation is nearly as low as the subgradient's bound, zero-half cuts
+            # mislead.
             num_added = master.cut(taken, with_zero_half_cuts=bounds[-1] <= priced + 0.2 * gap)
             is_stalled = (
                 len(bounds) > TUNING.patience
@@ -197,7 +194,7 @@ class AgilitySearch:
         return master
 
     def round_off(self, master: Master, taken: Floats) -> bool:
-        """Let HiGHS search among what a relaxation takes, in part; return whether that helped."""
+        """Let HiGHS search the tasks with a share in a relaxation; return whether that helped."""
         if not self.is_transitive:
             return False
         is_own = np.isin(self._rows, [a.opportunity for a in self.best.plan.actions])
@@ -208,12 +205,12 @@ class AgilitySearch:
         return plan is not None and self.best.offer(self._whole(plan, is_offered))
 
     def prove(self, master: Master, amount: float) -> None:
-        """Let HiGHS find a plan worth this much, or prove that there is none."""
+        """Let HiGHS find a plan worth ``amount``, or prove that there is none."""
         is_open = ~is_below(self.through, amount)
         if self.is_transitive:
             program = master.program(is_open)
         else:
-            # Then a plan may need tasks that it is not paid for.
+            # A plan may need tasks that it is not paid for.
             part = restricted(self.problem, self._rows[is_open])
             program = plan_program(part, "antichain", 0.0).program
             scale = float(self.problem.worth.max())
@@ -222,7 +219,7 @@ class AgilitySearch:
         plan, bound = prover.prove(0.0, self._watch)
         if plan is not None:
             self.best.offer(self._whole(plan, is_open))
-        # Whatever is worth the amount is among these tasks.
+        # Every plan worth the amount consists of these tasks.
         below = amount - self.best.unit if self.best.unit else amount
         value = max(bound, below, self.best.reward)
         self.best.lower(Bound(value=value, proof="milp", log=prover.log))
@@ -245,7 +242,7 @@ class AgilitySearch:
     def proof(self) -> Bound:
         """Return the bound with all that proves it."""
         bound = self.best.bound
-        # What multipliers prove elsewhere the steps prove too, to the tolerance of "better".
+        # Bounds by multipliers alone follow from the steps too, to the tolerance of "better".
         is_certified = is_optimal(bound.value, self._certified, 0.0)
         if bound.proof != "lagrangian" or not is_certified or bound.is_elementary:
             return bound
@@ -269,9 +266,9 @@ def path_multipliers(search: Search) -> Iterator[None]:
 
 
 def pass_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on paths that are paid once for a target in one pass over it.
+    """Ascend on paths that are paid for a target once in each pass over it.
 
-    A fleet has a bound by paths before, and what the first steps prove is above that.
+    A fleet already has a bound by paths, and the first steps here prove less.
     """
     engine, best = _engine(search), search.best
     known = best.bound.value
@@ -283,7 +280,7 @@ def pass_multipliers(search: Search) -> Iterator[None]:
 
 
 def windows(search: Search) -> Iterator[None]:
-    """Search windows of the plan; beside multipliers of passes longer where that finds nothing."""
+    """Search windows of the plan; with a choice of starts, longer while that finds nothing."""
     engine, left = _engine(search), search.effort.moves_per_task
     is_beside = search.problem.offers_choice
     least = TUNING.moves_per_task * (TUNING.little if is_beside else 1.0)
@@ -297,7 +294,7 @@ def windows(search: Search) -> Iterator[None]:
 
 
 def cutting_planes(search: Search) -> Iterator[None]:
-    """Cut and search among what is open, until plan and bound meet."""
+    """Add cutting planes and search among the open tasks, until plan and bound meet."""
     engine, best = _engine(search), search.best
     engine.shrink()
     if not engine.is_small:
@@ -307,7 +304,7 @@ def cutting_planes(search: Search) -> Iterator[None]:
 
 
 def cut_and_prove(engine: AgilitySearch, effort: Effort) -> Iterator[None]:
-    """Cut, then let HiGHS look for a better plan, or prove that there is none."""
+    """Add cutting planes, then let HiGHS find a better plan or prove that there is none."""
     best = engine.best
     engine.ascend()
     yield

@@ -24,7 +24,7 @@ from planner_core.solvers.base import Solution
 
 
 def insertion(search: Search) -> Iterator[None]:
-    """Put into the gaps of the plan what fits."""
+    """Insert tasks that fit into the gaps of the plan."""
     engine = search.engine(FreeStarts)
     engine.search.fill()
     engine.offer("insertion")
@@ -37,7 +37,7 @@ def windows(search: Search) -> Iterator[None]:
     num_tasks = max((len(s.spans.row) for s in engine.search.satellites), default=0)
     left = int(np.ceil(search.effort.moves_per_task * num_tasks / TUNING.moves_at_a_time))
     while left > 0:
-        # A slice of the multipliers takes seconds, and the driver compares what slices gain.
+        # The driver compares gains by slice, and a slice of the multipliers takes seconds.
         for _ in range(min(left, TUNING.several)):
             engine.search.move(TUNING.moves_at_a_time)
             engine.offer("window search")
@@ -46,20 +46,20 @@ def windows(search: Search) -> Iterator[None]:
 
 
 class FreeStarts:
-    """The search for plans with free starts, from the best plan as it begins."""
+    """The search for plans with free starts, from the best plan at its beginning."""
 
     def __init__(self, best: Incumbent, seed: int) -> None:
         self._best = best
         self.search = ContinuousSearch(best.problem, best.plan, best.budget, seed)
 
     def offer(self, message: str) -> None:
-        """Offer the plan that the search has come to."""
+        """Offer the search's plan."""
         self._best.offer(self.search.plan)
         self._best.report(message)
 
 
 def chain_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on chains of tasks with free starts, at a time until that has proven a bound."""
+    """Ascend on chains of tasks with free starts, in slices that each prove a bound."""
     best = search.best
     for proven in ascend_on_chains(search.problem, search.budget.stop):
         if proven is not None:
@@ -71,9 +71,9 @@ def chain_multipliers(search: Search) -> Iterator[None]:
 
 
 def fixed_starts(search: Search) -> Iterator[None]:
-    """Plan among the starts that opportunities have, and put in what fits between them.
+    """Plan among the opportunities' own starts, and insert tasks that fit in between.
 
-    What bounds that search bounds no plan with free starts: it is not reported.
+    The bound of that search does not hold for plans with free starts, so it is not reported.
     """
     budget, best = search.budget, search.best
     part = budget.part(1.0, lambda progress: budget.report(replace(progress, bound=None)))
@@ -86,7 +86,7 @@ def fixed_starts(search: Search) -> Iterator[None]:
 
 
 def _filled(best: Incumbent, plan: Plan, filled: Plan) -> Plan:
-    """Offer a plan, and with what fits between its tasks, unless that was done; return it."""
+    """Offer a plan, also with tasks that fit in between, unless done already; return the plan."""
     if plan != filled:
         best.offer(plan)
         best.offer(filled_with_resources(best.problem, plan, best.budget))
@@ -95,7 +95,7 @@ def _filled(best: Incumbent, plan: Plan, filled: Plan) -> Plan:
 
 
 def windows_with_resources(search: Search) -> Iterator[None]:
-    """Drop a few images and put in others, again and again, until that gets nowhere."""
+    """Drop a few images and insert others, repeatedly, until that improves nothing."""
     best, rng = search.best, np.random.default_rng(search.seed)
     plan, num_idle = best.plan, 0
     while num_idle < TUNING.fleet_patience and plan.actions:
@@ -113,14 +113,14 @@ def windows_with_resources(search: Search) -> Iterator[None]:
 
 
 def with_own_starts(problem: Problem, solution: Solution, budget: Budget) -> Solution:
-    """Return another solver's answer with what fits between its tasks once those may move.
+    """Return another solver's solution with tasks that fit in between if those of it may move.
 
-    "Optimal" meant the starts that opportunities have.
+    If it was "optimal", that was among the opportunities' own starts only.
     """
     if solution.termination is Termination.OPTIMAL and solution.proven is None:
         solution = replace(solution, termination=Termination.HORIZON_COMPLETE)
     if problem.pointing is None or solution.proven is not None or budget.is_cancelled:
-        # What has a bound here was searched with free starts already.
+        # A solution with a bound was searched with free starts already.
         return solution
     if problem.use_resources:
         plan = filled_with_resources(problem, solution.plan, Budget())

@@ -1,7 +1,7 @@
-"""A fleet whose images lose worth as they age: one satellite's day after another, planned anew.
+"""A fleet whose images lose worth as they age: one satellite's day after another is replanned.
 
-Each is planned beside the others', from a plan of a search in which images keep their worth: it has
-them brought down.
+The others keep theirs meanwhile. The first plan is that of a search in which images keep their
+worth, which brings them down.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from planner_core.problem.plan import Plan
 
 
 class FullWorth:
-    """What a search in which images keep their worth has come to.
+    """State of the search in which images keep their worth.
 
     Attributes
     ----------
     plan
-        The latest; None before there is one.
+        The latest plan; None before there is one.
     is_going
         Whether another may follow.
     """
@@ -43,7 +43,7 @@ class FullWorth:
 
 
 def plans_without_half_life(search: Search) -> Iterator[None]:
-    """Plan a fleet as if its images kept their worth, and once that has ended afresh."""
+    """Plan a fleet as if its images kept their worth, and restart whenever that search ends."""
     best, engine, full = search.best, search.engine(ResourceSearch), search.engine(FullWorth)
 
     def look(_: Progress) -> None:
@@ -63,14 +63,14 @@ def plans_without_half_life(search: Search) -> Iterator[None]:
             yield
         full.plan = inner.plan
         if inner.plan in ended:
-            break  # so few tasks that every search ends with the same
+            break  # so few tasks that every search ends with the same plan
         ended.append(inner.plan)
         num_idle = 0 if best.reward > before else num_idle + 1
     full.is_going = False
 
 
 def days(search: Search) -> Iterator[None]:
-    """Plan days anew from the latest plan without a half-life, as long as a round gains anything.
+    """Replan days from the latest plan without a half-life, as long as a round gains anything.
 
     Four satellites that turn to the sun earn 459.9 and 332.8 at half-lives of 12 and 3 h after 20
     CPU seconds, and 413.6 and 304.3 by contacts that the ascent names.
@@ -92,16 +92,16 @@ def days(search: Search) -> Iterator[None]:
 
 
 def _earned(best: Incumbent, plan: Plan) -> float:
-    """Return what a plan earns; nothing where time is over or it is not valid."""
+    """Return what a plan earns; minus infinity if it is not valid or the search is done."""
     timeline = best.judge(plan)
     return timeline.reward if timeline.is_valid and not best.is_done else -np.inf
 
 
 def _replanned(search: ResourceSearch, plan: Plan, seed: int) -> Plan:
-    """Return a plan with each satellite's day planned anew where that is better, then windows.
+    """Return a plan with each satellite's day, then windows, replanned if that is better.
 
-    With a slice for each satellite multipliers take half of the time, and large fleets earn 1 %
-    less after 20 CPU seconds.
+    All in one slice: with a slice for each satellite multipliers take half of the time, and large
+    fleets earn 1 % less after 20 CPU seconds.
     """
     best, problem = search.best, search.problem
     rng = np.random.default_rng(seed)
@@ -127,10 +127,10 @@ def _replanned(search: ResourceSearch, plan: Plan, seed: int) -> Plan:
 
 
 def _offered(search: ResourceSearch, plan: Plan) -> Plan:
-    """Return a plan that was offered, or the best one, which may be that with more contacts.
+    """Offer a plan; return it, or the best one (perhaps this one with more contacts) if better.
 
-    Of two that earn about the same the former, in which more images come down. Two fleets over 30
-    stations come within 1.4 and 1.7 % after 20 CPU seconds, and within 2.0 and 1.9 from that alone.
+    If both earn about the same, the offered one: more of its images come down. Two fleets over 30
+    stations are within 1.4 and 1.7 % after 20 CPU seconds, and within 2.0 and 1.9 from it alone.
     """
     search.offer(plan)
     enough = (1.0 - TUNING.little) * search.best.reward

@@ -129,7 +129,7 @@ STRATEGIES: Final = (
         slices=fleet.windows,
         begin=Begin.STALLED,
     ),
-    # Battery and recorder: several satellites, then one, which has the same in another order.
+    # Battery and recorder: several satellites, then one, with similar ones in another order.
     Strategy(
         name="plans and multipliers side by side",
         supports=is_shared_with_limits,
@@ -281,13 +281,13 @@ STRATEGIES: Final = (
         begin=Begin.STALLED,
     ),
 )
-"""Who may better plans and lower bounds, and of which problems."""
+"""Strategies that improve plans or lower bounds, each with the problems that it supports."""
 
 
 def solved(
     problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort | None = None
 ) -> Solution:
-    """Return the best plan and its bound, by all strategies that the problem has."""
+    """Return the best plan and its bound, by all strategies that support the problem."""
     is_free = has_free_starts(problem)
     best = Incumbent(
         problem,

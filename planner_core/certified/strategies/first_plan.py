@@ -1,4 +1,4 @@
-"""The plan that every search begins with."""
+"""The plan that every search starts from."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner_core.solvers.rule import Rule
 
 
 def rule(search: Search) -> Iterator[None]:
-    """Plan as the rule-based solver does, whatever the time."""
+    """Plan with the rule-based solver, whatever the budget."""
     plan = Rule().solve(search.problem, Budget(), search.seed).plan
     if has_limits(search.problem):
         search.engine(ResourceSearch).offer(plan)

@@ -1,10 +1,10 @@
-"""Many satellites without resources: incremental multipliers, and a search that heeds them.
+"""Many satellites without resources: incremental multipliers, and a search that uses them.
 
-A high multiplier says that a target is easily had: several satellites would take it. A first plan
-at these multipliers gives each satellite about its share. The window search goes on from there, and
-what its streams come to is merged. What is small enough goes on to cutting planes and HiGHS, as a
-single satellite does. For a large fleet there is time for few moves: its search begins them where a
-target has a multiplier and is not imaged, and takes only tasks that cost the bound little.
+A high multiplier means that several satellites would take the target. A first plan at these
+multipliers gives each satellite about its share. The window search continues from there, and the
+plans of its streams are merged. A small fleet goes on to cutting planes and HiGHS, as a single
+satellite does. For a large fleet there is time for few moves only: its search prefers targets with
+low multipliers, and takes only tasks that cost the bound little.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ class FleetSearch:
 
     @property
     def multipliers(self) -> Floats:
-        """The multipliers that prove the bound. Shape ``(num_targets,)``."""
+        """Multipliers that prove the bound. Shape ``(num_targets,)``."""
         return self._dual.multipliers
 
     def ascend(self, num_epochs: float = math.inf) -> None:
-        """Search for multipliers, so long or until more steps are of little use."""
+        """Search for multipliers, for some epochs or until more are of little use."""
         while num_epochs > 0 and not (self._dual.is_settled or self.best.is_done):
             self._dual.improve(TUNING.epochs_at_a_time, self.budget.stop)
             bound = Bound(value=self._dual.value, proof="lagrangian", multipliers=self.multipliers)
@@ -58,7 +58,7 @@ class FleetSearch:
             num_epochs -= TUNING.epochs_at_a_time
 
     def start(self) -> None:
-        """Plan one stretch after another at the multipliers."""
+        """Plan one part of the network after another at the multipliers."""
         if self.best.is_done:
             return
         self.best.offer(self._plan_at_multipliers(self._seed))
@@ -74,14 +74,14 @@ class FleetSearch:
         return Plan.of(self.problem, rows).with_kept(self.problem)
 
     def search(self, moves_per_task: float) -> Iterator[None]:
-        """Search windows, in several streams where the fleet is small, as far as that leads."""
+        """Search windows, in several streams if the fleet is small, a slice at a time."""
         num_accesses = num_choices(self.problem)
         num_streams = TUNING.tries if is_small_free_fleet(self.problem) else 1
         offered = None if is_small_free_fleet(self.problem) else self.near_best()
         streams = [self.windows(number) for number in range(num_streams)]
         pool = PlanPool(self.problem, self.budget, self._seed)
         left = int(moves_per_task * num_accesses)
-        # So long that a few without a better plan say something.
+        # So many moves that a few slices without a better plan mean something.
         in_a_slice = int(TUNING.moves_per_task * num_accesses / TUNING.patience) + 1
         with side_by_side(self.budget.num_threads) as together:
             while left > 0 and not self.best.is_done:
@@ -98,23 +98,23 @@ class FleetSearch:
                 for plan in (pool.plan, *(stream.plan for stream in streams)):
                     self.best.offer(plan)
                 if left == before:
-                    return  # a stream's plan claims to be good enough, and the referee differs
+                    return  # a stream's reward is close enough, but not by the referee
                 yield
 
     def _is_wanted(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> bool:
-        """Return whether the search is to go on; tell how far it is."""
+        """Report progress; return whether the search is to continue."""
         reward = max(pool.reward, *(stream.reward for stream in streams))
         self.best.report("window search", reward)
         return not (self.best.is_within(self.best.gap, reward) or self.budget.is_spent())
 
     def _merge(self, pool: PlanPool, streams: Sequence[WindowSearch]) -> None:
-        """Seek what the plans of the streams are worth together."""
+        """Merge the plans of the streams into a better one."""
         for stream in streams:
             pool.add(stream.plan.with_kept(self.problem))
         pool.merge()
 
     def near_best(self) -> Bools:
-        """Return the opportunities that a plan may hold without the bound falling much.
+        """Return a mask of the opportunities that a plan may hold at little cost to the bound.
 
         Shape ``(num_opportunities,)``.
         """
@@ -126,10 +126,10 @@ class FleetSearch:
         return is_near
 
     def windows(self, number: int) -> WindowSearch:
-        """Return a window search from a start of its own, the first from the best plan."""
+        """Return a window search with its own start: number 0 the best plan, others another one."""
         preference = None
         if not is_small_free_fleet(self.problem):
-            # Satellites hardly compete for targets with low multipliers: those are hard to have.
+            # Targets with low multipliers are hard to reach, as satellites hardly compete for them.
             wanted = np.minimum(self.multipliers / np.maximum(self.problem.best_worth, 1e-300), 1.0)
             preference = 1.0 + TUNING.preference * (0.5 - wanted)
         seed = self._seed + number
@@ -148,12 +148,12 @@ def fleet_multipliers(search: Search) -> Iterator[None]:
 
 
 def windows(search: Search) -> Iterator[None]:
-    """Search windows, in several streams where the fleet is small."""
+    """Search windows, in several streams if the fleet is small."""
     yield from search.engine(FleetSearch).search(search.effort.moves_per_task)
 
 
 def fleet_cutting_planes(search: Search) -> Iterator[None]:
-    """Cut and search a small fleet's plans as a satellite's."""
+    """Add cutting planes and search a small fleet's plans, as for a single satellite."""
     fleet = search.engine(FleetSearch)
     if search.effort.max_rounds == 0:
         return

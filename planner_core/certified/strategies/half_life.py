@@ -1,9 +1,9 @@
-"""Where images are worth less the later they come down: plans by the contacts that they take.
+"""Plans by the contacts that they take, if images are worth less the later they come down.
 
-The bound's ascent tells which contacts are worth their energy. Where those must be taken an image
-has one worth, that of the time at which it comes down: at first with the contact after it, then, as
-a plan fills the queue of the recorder, with what that plan leaves to be taken down before. The
-searches for plans go by that, the referee says what it has come to.
+The bound's ascent shows which contacts are worth their energy. With these taken, each image has a
+single worth, that of the time when it comes down: at first by the contact after it, then, once a
+plan fills the recorder's queue, after the data queued before it. The searches for plans go by these
+worths; the referee decides what their plans earn.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import taking
 
 _FOR_PLANS: Final = (rule, windows_and_choices, choices_from_the_best)
-"""Searches that are quick to a good plan, and lower no bound."""
+"""Searches that find a good plan quickly, and lower no bound."""
 
 
 def agility_bound(search: Search) -> Iterator[None]:
@@ -54,10 +54,10 @@ def agility_bound(search: Search) -> Iterator[None]:
 def plans_without_half_life(search: Search) -> Iterator[None]:
     """Plan one satellite as if its images kept their worth, for a part of the time.
 
-    Plans by their contacts bring all images down. With a large share when they are taken it is
-    better to leave some on board: 1,000 targets, `paper`, a share of 0.9 and half-lives of 24 and
-    6 h earn 302.8 and 296.2 of 308.6 and 304.1 after 10 CPU seconds, in place of 284.5 and 262.7;
-    300, with 3 h, 238.8 and 239.9 of 253.0 and 256.8 after 8, in place of 230.1 and 232.1.
+    Plans by their contacts bring all images down. If images earn a large share when taken, leaving
+    some on board is better: 1,000 targets, `paper`, a share of 0.9 and half-lives of 24 and 6 h
+    earn 302.8 and 296.2 of 308.6 and 304.1 after 10 CPU seconds instead of 284.5 and 262.7; 300
+    targets with 3 h earn 238.8 and 239.9 of 253.0 and 256.8 after 8 s instead of 230.1 and 232.1.
     """
     engine = search.engine(ResourceSearch)
 
@@ -73,11 +73,11 @@ def plans_without_half_life(search: Search) -> Iterator[None]:
 
 
 def program_windows(search: Search) -> Iterator[None]:
-    """Plan windows of the day anew by small programs, and longer ones where none is better.
+    """Replan windows of the day by small programs, and longer windows if none gains anything.
 
-    One satellite over 60 to 120 targets ended within five CPU seconds up to 3.5 % below its bound.
-    At a half-life of 12 h it earns 55.84, 91.44 and 108.82 now after eight, and earned 53.97, 90.21
-    and 105.87, of at most 55.89, 92.26 and 109.32.
+    Without these, one satellite over 60 to 120 targets ends within five CPU seconds up to 3.5 %
+    below its bound. At a half-life of 12 h it earns 55.84, 91.44 and 108.82 after eight with them,
+    and 53.97, 90.21 and 105.87 without, of at most 55.89, 92.26 and 109.32.
     """
     best, engine = search.best, search.engine(ResourceSearch)
     windows = ProgramWindows(best.problem, best.budget, search.seed)
@@ -96,7 +96,7 @@ def program_windows(search: Search) -> Iterator[None]:
 def multipliers(search: Search) -> Iterator[None]:
     """Lower the bound by multipliers of targets and contacts.
 
-    At first half as long where queues come next, which go on with it.
+    The first slice is half as long if queues come next, which continue this ascent.
     """
     shared = search.engine(Contacts)
     shared.lower(TUNING.rounds if is_shared(search.problem) else TUNING.rounds // 2)
@@ -119,9 +119,9 @@ def queues(search: Search) -> Iterator[None]:
 
 
 def windows_of_the_first(search: Search) -> Iterator[None]:
-    """Plan windows of the first plan anew, its contacts as they are, before bounds take long.
+    """Replan windows of the first plan with its own contacts, before bounds take long.
 
-    Of 1,000 targets, `paper`, a share of 0.9, 276.5 are had after 0.4 s, where the rule has 233.5.
+    1,000 targets, `paper`, a share of 0.9 earn 276.5 after 0.4 s; the rule's plan earns 233.5.
     """
     best = search.best
     contacts = list(contacts_of(best.problem, best.plan))
@@ -133,7 +133,7 @@ def windows_of_the_first(search: Search) -> Iterator[None]:
 
 
 def plans_by_contacts(search: Search) -> Iterator[None]:
-    """Search for plans that take contacts which the bounds name, or others near the best plan's."""
+    """Search for plans that take contacts named by the bounds, or some near the best plan's."""
     best, engine, shared = search.best, search.engine(ResourceSearch), search.engine(Contacts)
     tried: set[tuple[int, ...]] = set()
     rng = np.random.default_rng(search.seed)
@@ -159,7 +159,7 @@ def plans_by_contacts(search: Search) -> Iterator[None]:
 def _near(
     problem: Problem, contacts: tuple[int, ...], rng: np.random.Generator
 ) -> Iterator[tuple[int, ...]]:
-    """Yield these contacts with one more or less, in random order."""
+    """Yield these contacts with one added or removed, in random order."""
     every = np.flatnonzero(problem.opportunities.kind == CONTACT)
     for row in rng.permutation(every).tolist():
         yield tuple(sorted({row}.symmetric_difference(contacts)))
@@ -173,7 +173,7 @@ def _plan_with(
     seed: int,
     per_collect: int,
 ) -> None:
-    """Look for plans that take these contacts, as far as stations can serve them."""
+    """Seek plans that take these contacts, as far as stations can serve them."""
     problem, stop = best.problem, best.budget.stop
     taken = served(problem, contacts)
     rng = np.random.default_rng(seed)
@@ -202,7 +202,7 @@ def _plan_with(
 def _bettered(
     best: Incumbent, part: Problem, plan: Plan, unit: float, seed: int, *, is_known: bool
 ) -> Plan:
-    """Return a plan that is better by windows, and by choices of tasks unless it is from queues."""
+    """Return a plan improved by windows, and by choices of tasks unless it is from queues."""
     if is_known:
         return bettered_by_windows(best, part, plan, seed)
     alternating = AlternatingSearch(part, plan, unit, best.budget, seed)

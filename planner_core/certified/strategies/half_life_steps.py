@@ -1,6 +1,6 @@
-"""What the strategies share where images are worth less the later they come down.
+"""Steps that the strategies share if images are worth less the later they come down.
 
-`half_life.py` makes slices of these steps for one satellite or few, `days.py` for fleets.
+`half_life.py` combines them into slices for one satellite or few, `days.py` for fleets.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Contacts:
     Attributes
     ----------
     named
-        Those of the best paths, the latest last; none where such programmes take too long.
+        Those of the best paths, latest last; empty if such programmes take too long.
     """
 
     def __init__(self, best: Incumbent, _seed: int) -> None:
@@ -44,13 +44,13 @@ class Contacts:
         return self.ascent.multipliers if self._multipliers is None else self._multipliers
 
     def lower(self, num_rounds: int, *, is_last: bool = False) -> None:
-        """Go on with the ascent for a while, at most for a part of the time that is left."""
+        """Continue the ascent for some rounds, at most for a part of the time that is left."""
         best, ascent = self._best, self.ascent
         part = best.budget.part(TUNING.beginning)
         for _ in range(num_rounds):
             if part.is_spent():
                 break
-            # Until a good plan is known a value near the bound stands for it.
+            # Until a good plan is known, a value near the bound stands in for its reward.
             level = max(best.reward, (1.0 - TUNING.little) * ascent.value)
             ascent.improve(1, level, best.budget.stop)
         bound = ascent.bound(is_last=is_last)
@@ -58,13 +58,13 @@ class Contacts:
         best.report("multipliers")
 
     def name(self) -> None:
-        """Find contacts, with few levels of energy at first, and multipliers."""
+        """Name contacts, with few levels of energy, and find multipliers that suit them."""
         hoped = max(self._best.reward, (1.0 - 2.0 * TUNING.little) * self.ascent.value)
         self._find(TUNING.fine, hoped)
         self._ascend()
 
     def prove(self) -> None:
-        """Prove a bound, which may name other contacts."""
+        """Prove a bound with more levels of energy, which may name other contacts."""
         if self.named and not self._best.is_done:
             known = self.named[-1]
             self._find(TUNING.levels_per_collect, self._best.reward)
@@ -82,7 +82,7 @@ class Contacts:
             )
 
     def _find(self, per_collect: int, level: float) -> None:
-        """Let exact programmes of queues bound the plans and name the contacts of the best one."""
+        """Bound plans by exact programmes over queues, and name the contacts of the best paths."""
         best, contact_multipliers = self._best, self.ascent.contact_multipliers
         exact = self.named[-1] if self.named else ()
         value, rows = queue_value(
@@ -111,7 +111,7 @@ class Contacts:
 
 
 def bettered_by_windows(best: Incumbent, part: Problem, plan: Plan, seed: int) -> Plan:
-    """Return a plan with windows planned anew where that is better."""
+    """Return a plan improved by replanning windows of it."""
     windows = ResourceWindows(part, seed)
     windows.adopt(plan)
     windows.make_moves_on_each(TUNING.patience * TUNING.moves_in_a_step, best.budget)

@@ -25,7 +25,7 @@ from planner_core.problem import Floats
 
 
 def plans_and_multipliers(search: Search) -> Iterator[None]:
-    """Search for plans and multipliers side by side, until the multipliers have settled."""
+    """Search for plans and for multipliers side by side, until the multipliers have settled."""
     engine, plans = search.engine(ResourceSearch), search.engine(FleetPlans)
     ascent = plans.ascent(engine)
     while not (ascent.is_settled or search.best.is_done):
@@ -36,8 +36,9 @@ def plans_and_multipliers(search: Search) -> Iterator[None]:
 def plans_and_programs(search: Search) -> Iterator[None]:
     """Search for plans, in steps and by programs side by side, until neither finds a better one.
 
-    Programs begin once multipliers have an exact answer. Earlier they better plans as much, but
-    the bound comes last: with rewards of 1 to 10 four satellites are at 6.4 % after 20 s.
+    Programs begin once the multipliers have been put to the exact programmes. Before, they would
+    improve plans as much, but the bound would come last: with rewards of 1 to 10 four satellites
+    are at 6.4 % after 20 s.
     """
     engine, plans = search.engine(ResourceSearch), search.engine(FleetPlans)
     ascent = plans.ascent(engine)
@@ -49,7 +50,7 @@ def plans_and_programs(search: Search) -> Iterator[None]:
     programs = ProgramSearch(
         search.problem, plans.pool, engine.resource_ascent, ascent, search.budget, search.seed
     )
-    # A small fleet has programs for sets of contacts, and the whole one, when this has ended.
+    # For a small fleet, programs for sets of contacts and the whole one follow when this ends.
     patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
     num_idle = 0
     while num_idle < patience and not search.best.is_done:
@@ -58,7 +59,7 @@ def plans_and_programs(search: Search) -> Iterator[None]:
 
 
 class FleetPlans:
-    """A search for plans, and what goes on beside it.
+    """A search for plans, and another beside it.
 
     Attributes
     ----------
@@ -78,10 +79,10 @@ class FleetPlans:
         return self._ascent
 
     def go_on(self, search: ResourceSearch, other: FleetAscent | ProgramSearch) -> bool:
-        """Let the search for plans and another go on side by side; return whether a plan is better.
+        """Run the search for plans and another side by side; return whether a plan is better.
 
-        That search learns from no other: it would lead nowhere new from their plans. Where other
-        strategies have found a better plan, it goes on from that.
+        The search for plans takes none from the other or the pool, as these would lead it nowhere
+        new. If another strategy has found a better plan, it continues from that.
         """
         best, alternating = self._best, search.alternating_search
         if best.reward > self._known:
@@ -104,22 +105,22 @@ class FleetPlans:
 class FleetAscent:
     """Multipliers by energy alone, then from relaxations with the plan's contacts; their bound.
 
-    To search with the exact programmes takes fifty times as long as with energy alone, and brings
-    next to nothing where each satellite has an antenna when it wants one. Where some do not it is
-    asked at multipliers of antennas: a linear program has them (``antenna_multipliers``), and where
-    images count on the ground alone steps go on from there. Four satellites and two stations come
-    to 865 in place of 887 by such steps, and another four to 1,068 in place of 1,077.
-    Otherwise the relaxation of the plan's contacts knows of recorders as well, and its
+    Searching with the exact programmes takes fifty times as long as with energy alone, and gains
+    next to nothing if each satellite has an antenna whenever it wants one. If some do not, the
+    exact programmes are solved at multipliers of antennas from a linear program
+    (``antenna_multipliers``), followed by steps if images count only on the ground. By such steps
+    four satellites and two stations have 865 instead of 887, and another four 1,068 instead of
+    1,077. Otherwise the relaxation of the plan's contacts accounts for recorders as well, and its
     multipliers are nearly the best for all contacts.
 
     Attributes
     ----------
     exact
-        The search that has seen what they prove, once it has come to that.
+        The exact search for multipliers, once it has proven a bound.
     knows_antennas
-        Whether multipliers of antennas have lowered the bound.
+        Whether steps on multipliers of antennas have lowered the bound.
     steps_beside
-        How many steps of the search for plans take about as long as the next turn.
+        How many steps of the search for plans take about as long as the next step here.
     """
 
     def __init__(self, search: ResourceSearch) -> None:
@@ -132,21 +133,21 @@ class FleetAscent:
 
     @property
     def losses(self) -> Floats:
-        """What taking each costs, about; infinite where no good plan does. Shape ``(n,)``."""
+        """Approximate cost of taking each; infinite if no good plan does. Shape ``(n,)``."""
         usage = self._paths.usage
         if self.exact is not None and self.knows_antennas:
             usage = self.exact.usage
-        # Those come first that most answers take.
+        # The more answers take an opportunity, the less it costs.
         return np.where(usage > 0.0, 1.0 - usage / max(1.0, usage.max()), np.inf)
 
     def step(self) -> None:
-        """Ask by energy alone some more, or relax, or prove something."""
+        """Make the next step: ascend by energy alone, solve a relaxation, or prove a bound."""
         beside = next(self._work, None)
         self.is_settled = beside is None
         self.steps_beside = beside or 1
 
     def _steps(self) -> Iterator[int]:
-        """Yield how long each turn takes, before it."""
+        """Yield how long each step takes, before it."""
         search, usage = self._search, self._paths.usage
         beside_ascent = TUNING.steps_beside if is_fleet(search.problem) else TUNING.tries
         energy = ascent_on_energy(
@@ -154,14 +155,14 @@ class FleetAscent:
         )
         while not energy.is_settled:
             yield beside_ascent
-            # What takes opportunities counts from here on: answers come near the best plans.
+            # Usage counts only the latest answers, which are nearer to the best plans.
             usage[:] = 0.0
             search.ask_energy(energy)
         yield beside_ascent
         ascent, _ = search.begin_ascent(energy)
         known = search.best.bound
-        # Where batteries alone allow so much more than a plan earns, recorders are full:
-        # multipliers that know of them prove more.
+        # If batteries alone allow so much more than a plan earns, recorders are full: multipliers
+        # that account for them prove more.
         is_far = search.best.reward < (1.0 - TUNING.tight) * energy.value
         if is_far:
             yield from self._go_by_plan(energy, ascent)
@@ -179,7 +180,7 @@ class FleetAscent:
             yield from self._prove_finely(ascent)
 
     def _go_by_plan(self, energy: Ascent, ascent: ResourceAscent) -> Iterator[int]:
-        """Have multipliers that relaxations with the plan's contacts lead to."""
+        """Restart from multipliers of relaxations with the plan's contacts."""
         search, usage = self._search, self._paths.usage
         # With turns to the sun each pair of near tasks has a column, and a relaxation takes as long
         # as ten programs over the few tasks that most answers take.
@@ -188,7 +189,7 @@ class FleetAscent:
             return
         for share in TUNING.multiplier_shares[1:-1]:
             self._ask_near(share * energy.multipliers)
-        # Without cutting planes at first: that finds tasks.
+        # Without cutting planes at first: its multipliers show which further tasks to offer.
         for num_rounds in range(TUNING.tries):
             yield TUNING.steps_beside
             offered = (usage > 0.0) | (ascent.usage > 0.0)
@@ -199,7 +200,7 @@ class FleetAscent:
             ascent.restart(relaxation.multipliers)
 
     def _prove_finely(self, ascent: ResourceAscent) -> Iterator[int]:
-        """Ask the best multipliers once more, with more levels of the recorder."""
+        """Prove a bound at the best multipliers with more levels of the recorder."""
         yield TUNING.steps_beside
         ascent.count_finely(self._search.best.plan)
         self._search.ascend(ascent, 1)
@@ -207,13 +208,12 @@ class FleetAscent:
     def _ascend_on_antennas(
         self, ascent: ResourceAscent, known: Bound
     ) -> Generator[int, None, bool]:
-        """Let multipliers of antennas lower the bound; return whether they have.
+        """Lower the bound by multipliers of antennas; return whether that succeeded.
 
         Parameters
         ----------
         known
-            A bound from before: its multipliers are better where recorders are shorter than
-            batteries.
+            An earlier bound: its multipliers are better if recorders limit more than batteries.
         """
         if known.unit is not None and known.multipliers is not None and known.value < ascent.value:
             ascent.restart(known.multipliers)
@@ -221,10 +221,10 @@ class FleetAscent:
         paid = yield from self._pay_for_volume(ascent, at_first)
         is_paid, at_first = paid < at_first, paid
         if not self._search.problem.objective.is_delivered:
-            # Where images earn a share on board further steps gain nothing that pays for them.
+            # If images earn a share on board, further steps gain too little for the time they take.
             return is_paid
         began = ascent.multipliers, ascent.antenna_multipliers
-        # Steps are many, and rounding to larger units loses less than they gain.
+        # Larger units allow many steps, which gain more than rounding loses.
         unit = ascent.unit
         ascent.count_in(TUNING.several * unit, moves_antennas=True)
         ascent.usage[:] = 0.0
@@ -246,11 +246,11 @@ class FleetAscent:
     def _pay_for_volume(
         self, ascent: ResourceAscent, at_first: float
     ) -> Generator[int, None, float]:
-        """Ask multipliers at which contacts pay for all that images earn by coming down.
+        """Try multipliers at which contacts pay for all that images earn by coming down.
 
-        Those of targets are lower by as much: by what the program says of their images, or all to
-        what images earn on board. Return what the better of the two proves if that lowers the
-        bound by much, and what is known if not.
+        Those of targets are reduced accordingly: by the program's share of each target, or all to
+        the share that images earn on board. Returns the better value of the two if it lowers the
+        bound noticeably, else the known one.
         """
         search = self._search
         began = ascent.multipliers, ascent.antenna_multipliers
@@ -275,7 +275,7 @@ class FleetAscent:
         return at_first if best[1] is began[0] else best[0]
 
     def _ask_near(self, multipliers: Floats) -> None:
-        """Solve by energy alone at multipliers near these, so that more tasks become known."""
+        """Solve by energy alone at multipliers near these, so that more tasks come into use."""
         num_epochs = TUNING.many_epochs // TUNING.tries
         steps = Steps(first=TUNING.little * TUNING.first_step, last=1.0, num_epochs=num_epochs)
         search = self._search

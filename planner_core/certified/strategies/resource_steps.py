@@ -1,6 +1,6 @@
 """The steps with battery and recorder, each towards a better plan or a lower bound.
 
-`resources.py` makes slices of them for one satellite, `resource_fleet.py` for several.
+`resources.py` combines them into slices for one satellite, `resource_fleet.py` for several.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class ResourceSearch:
         self.best, self.problem, self.budget = best, best.problem, best.budget
         self.seed, self._first = seed, best.bound
         self._relaxed: dict[tuple[int, ...], Relaxation] = {}
-        # By contacts and number of tasks offered: what no plan was found to be worth.
+        # By contacts and number of tasks offered: the worth that no plan was found to have.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
         self._unrounded = np.inf  # the bound before it was rounded
         self._one = self.problem.typical_worth
         self._agility_decides = False
-        self._brought_down: set[Plan] = set()  # what was tried with further contacts
+        self._brought_down: set[Plan] = set()  # plans already tried with further contacts
         self._ascent: ResourceAscent | None = None
 
     @cached_property
@@ -55,12 +55,12 @@ class ResourceSearch:
         return unit
 
     def choose(self, alone: Callable[[], Bools]) -> Iterator[None]:
-        """Look for first plans among choices of tasks, and near those of agility alone.
+        """Seek first plans among choices of tasks, and near the best plan of agility alone.
 
         Parameters
         ----------
         alone
-            Returns the tasks of a plan that agility alone bounds.
+            Returns the tasks of a plan that only agility limits.
         """
         choices = ChoiceSearch(self.problem, self.unit, self.seed, self.budget.stop)
         choices.start(self.mask([]), TUNING.first_goal)
@@ -74,28 +74,28 @@ class ResourceSearch:
             yield
 
     def _is_bound_by_agility(self) -> bool:
-        """Return whether battery and recorder hardly bound the plans more than agility alone."""
+        """Return whether battery and recorder limit plans hardly more than agility alone."""
         if self.best.bound.proof == "lagrangian":
             return True
         if not self.problem.counts_delivery or self.problem.objective.is_delivered:
             return False
-        # What stays on board lowers the other bound by a little, and says nothing of the images.
+        # Data that stays on board lowers the other bound a little, but limits no images.
         alone = lagrangian_bound(self.problem, self.best.reward)
-        # 0 to 3 % above where agility decides (the demonstration's mission), 76 % and more where
-        # energy does (the paper's draws).
+        # 0 to 3 % above it if agility decides (the demonstration's mission), 76 % or more if energy
+        # does (the paper's draws).
         return alone.value <= (1.0 + TUNING.far_above) * self.best.bound.value
 
     @cached_property
     def alternating_search(self) -> AlternatingSearch:
-        """The search for plans of one satellite, or of few."""
+        """The search for plans, the same one for all strategies."""
         return self.alternating(self.unit)
 
     def alternating(self, unit: float) -> AlternatingSearch:
-        """Return a search for plans that begins at the best."""
+        """Return a search for plans that starts from the best one."""
         return AlternatingSearch(self.problem, self.best.plan, unit, self.budget, self.seed)
 
     def search(self, alternating: AlternatingSearch, num_steps: int) -> bool:
-        """Search for plans from the best, while that leads on; return whether one is better."""
+        """Search for plans until a few steps gain nothing; return whether the best one improved."""
         before, idle_steps = self.best.reward, 0
         for _ in range(num_steps):
             if self.best.is_done or idle_steps == TUNING.several:
@@ -107,11 +107,11 @@ class ResourceSearch:
         return self.best.reward > before
 
     def offer(self, plan: Plan) -> bool:
-        """Take a plan, or what it is with further contacts, if it is better.
+        """Take a plan, or the plan with further contacts, if it is better; return whether it is.
 
-        The search for plans counts what each image earns at most. With further contacts more
-        of them come down: on the demonstration's mission a plan earns 178.6 of 180 after 10 CPU
-        seconds, and 172.3 without (177.6 and 171.7 after five).
+        The search for plans counts the most that each image can earn. With further contacts more
+        images come down: on the demonstration's mission a plan earns 178.6 of 180 after 10 CPU
+        seconds, and 172.3 without them (177.6 and 171.7 after five).
         """
         is_better = self.best.offer(plan)
         if plan in self._brought_down:
@@ -121,10 +121,10 @@ class ResourceSearch:
         return (more is not plan and self.best.offer(more)) or is_better
 
     def relax_whole(self) -> None:
-        """Bound plans by the relaxation of the whole program, where one image betters another.
+        """Bound plans by the whole program's relaxation, if images of a target differ in worth.
 
-        There the exact programmes pay for rounding to whole units with every image, and it is
-        nearly tight. Where all images of a target earn the same they say as much or more.
+        Then the exact programmes lose by rounding each image to whole units, and the relaxation is
+        nearly tight. If all images of a target earn the same, the programmes prove as much or more.
         """
         is_too_large = len(self.problem.opportunities) > TUNING.most_columns
         if is_too_large or not self.problem.has_better_images:
@@ -135,7 +135,7 @@ class ResourceSearch:
         self.best.report("relaxation")
 
     def mask(self, rows: Iterable[int]) -> Bools:
-        """Return which opportunities these are."""
+        """Return a mask of these opportunities. Shape ``(n,)``."""
         mask = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
         mask[list(rows)] = True
         return mask
@@ -153,7 +153,7 @@ class ResourceSearch:
         self.best.report("multipliers")
 
     def multipliers(self) -> Floats:
-        """Return multipliers to begin with."""
+        """Return multipliers to start from."""
         known = self.best.bound.multipliers
         if known is None or self.best.bound is self._first:
             known = lagrangian_bound(self.problem, self.best.reward).multipliers
@@ -161,10 +161,10 @@ class ResourceSearch:
 
     @property
     def resource_ascent(self) -> ResourceAscent:
-        """The search for multipliers, which begins where the battery or the recorder alone leads.
+        """The exact search for multipliers, which starts from those of battery or recorder alone.
 
-        To ask the battery alone takes a fiftieth of the time; where that does not lead below what
-        is known by much, the exact programme is not asked at its multipliers either.
+        Solving by the battery alone takes a fiftieth of the time; if its ascent hardly lowers the
+        value, the exact programme is not run at its multipliers either.
         """
         if self._ascent is not None:
             return self._ascent
@@ -181,9 +181,9 @@ class ResourceSearch:
         return ascent
 
     def begin_ascent(self, energy: Ascent) -> tuple[ResourceAscent, float]:
-        """Begin the search for multipliers after an ascent; return it and what is known by then.
+        """Begin the exact search for multipliers after an ascent; return it and the known value.
 
-        Where it has begun already it is the same.
+        If it has begun already, the same search is returned.
         """
         self.prove_by_energy(energy)
         value, multipliers = self.ask_data(energy)
@@ -195,13 +195,13 @@ class ResourceSearch:
         return self._ascent, value
 
     def ask_energy(self, energy: Ascent) -> None:
-        """Look for better multipliers by energy alone, for a while."""
+        """Seek better multipliers by energy alone, for some epochs."""
         energy.improve(TUNING.many_epochs, self.budget.stop)
 
     def ask_data(self, energy: Ascent) -> tuple[float, Floats]:
-        """Return what plans earn at most by batteries or recorders alone, and the multipliers.
+        """Return the better value by batteries or by recorders alone, and its multipliers.
 
-        Where energy is plenty and images on board earn a share, recorders say more: one to three
+        If energy is plentiful and images on board earn a share, recorders prove more: one to three
         real satellites over few stations have bounds of 125.3, 367.3 and 252.5 by them after ten
         CPU seconds, and 130.5, 377.5 and 258.8 without.
         """
@@ -218,13 +218,13 @@ class ResourceSearch:
         return (data.value, data.multipliers) if data.value < energy.value else known
 
     def prove_by_energy(self, energy: Ascent) -> None:
-        """Take what batteries alone prove, where that is less than what is known.
+        """Lower the bound to what batteries alone prove, if that is less.
 
-        The exact programmes know of recorders and count worth in units. Where images of a target
-        differ in worth these lose by that: four satellites under clouds come to 801.0 by batteries
-        and 806.2 by those, another four to 728.8, and 734.0 by agility alone.
+        The exact programmes include recorders but count worth in units, and lose by that if images
+        of a target differ in worth: four satellites under clouds have 801.0 by batteries and 806.2
+        by those programmes, another four 728.8 by batteries and 734.0 by agility alone.
         """
-        # With turns to the sun answers are estimates.
+        # With turns to the sun the values are estimates.
         if energy.value < self.best.bound.value and not self.problem.turns_to_the_sun:
             multipliers = energy.multipliers
             none = np.zeros(np.count_nonzero(self.problem.opportunities.kind == CONTACT))
@@ -262,12 +262,12 @@ class ResourceSearch:
         return True
 
     def relax_plan(self, offered: Bools, num_rounds: int) -> Relaxation | None:
-        """Return the relaxation of the best plan's contacts, None where there is no point.
+        """Return the relaxation with the best plan's contacts, None if it has no point.
 
         Parameters
         ----------
         offered
-            Tasks that may be taken, beside those of the plan. Shape ``(n,)``.
+            Tasks that may be taken besides those of the plan. Shape ``(n,)``.
         num_rounds
             Of cutting planes.
         """
@@ -279,10 +279,10 @@ class ResourceSearch:
         return relaxation if np.isfinite(relaxation.value) else None
 
     def fix_own_contacts(self) -> bool:
-        """Search for a better plan with the contacts of the best one; return whether it is.
+        """Search all tasks for a better plan with the best one's contacts; return if there is one.
 
-        Of all tasks. Rounds of cutting planes cost three times as long and lead no further, nor
-        does HiGHS beyond its first node, which takes a second or two where that took 16.
+        Rounds of cutting planes take three times as long and lead no further, nor does HiGHS beyond
+        its first node: that node takes a second or two, the longer search took 16.
         """
         if self.best.bound.value < self.best.better + TUNING.room * self._one:
             return False
@@ -293,16 +293,16 @@ class ResourceSearch:
 
     @property
     def _own(self) -> tuple[Bools, tuple[int, ...]]:
-        """Which opportunities the best plan takes, and its contacts."""
+        """Mask of the opportunities that the best plan takes, and its contacts."""
         own = self.mask(action.opportunity for action in self.best.plan.actions)
         is_contact = self.problem.opportunities.kind == CONTACT
         return own, tuple(np.flatnonzero(own & is_contact).tolist())
 
     def fix_contacts(self, *, is_last: bool, is_rounded: bool = False) -> bool:
-        """Search for a better plan with the most promising contacts; return whether it is.
+        """Search for a better plan with the most promising contacts; return whether there is one.
 
-        Where a relaxation leaves little room above a better plan that takes long. Unless this
-        is the last resort it waits for multipliers, which may show that there is none.
+        This takes long if a relaxation leaves little room above a better plan. Then, unless it is
+        the last resort, it waits for multipliers, which may prove that there is none.
 
         Parameters
         ----------
@@ -328,7 +328,7 @@ class ResourceSearch:
         if relaxed < self.best.better - 1e-6:
             self._missed[contacts, size] = self.best.better
             return False
-        # The last image is the hardest, and may be none: whoever wants it asks again.
+        # The last image is the hardest to find and may not exist: only a later call asks for it.
         wanted = rounded_bound(self.problem, relaxed - self._one, self.best.better)
         if wanted >= self._missed.get((contacts, size), np.inf):
             wanted = self.best.better
@@ -340,7 +340,7 @@ class ResourceSearch:
         return is_better
 
     def promising(self, relaxation: Relaxation, size: int) -> Bools:
-        """Return the tasks that the relaxation would take at the least loss."""
+        """Return the tasks of least reduced cost in the relaxation, and those of the best plan."""
         losses = relaxation.losses
         cut_off = np.sort(losses[np.isfinite(losses)])[:size][-1]
         own = self.mask(action.opportunity for action in self.best.plan.actions)
@@ -349,5 +349,5 @@ class ResourceSearch:
 
     @property
     def relaxed(self) -> float:
-        """What the best relaxation with fixed contacts is worth: multipliers hardly get below."""
+        """Value of the best relaxation with fixed contacts: multipliers hardly get below it."""
         return max((r.value for r in self._relaxed.values()), default=-np.inf)

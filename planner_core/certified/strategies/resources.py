@@ -1,10 +1,10 @@
 """With battery and recorder, one satellite or few: plans and bounds by exact programmes.
 
-Where energy is short the programme without multipliers bounds the best plan within an image or two,
-and the same programme over choices of tasks finds one. Where targets are few as well, multipliers
-lower the bound. The relaxations of promising sets of contacts tell multipliers and, for each set,
-the few tasks that make a small mixed-integer program. Where agility alone decides, so does the
-proof without resources.
+If energy is short, the programme without multipliers bounds the best plan within an image or two,
+and the same programme over choices of tasks finds one. If targets are few as well, multipliers
+lower the bound. The relaxations of promising sets of contacts give multipliers and, for each set,
+the few tasks of a small mixed-integer program. If only agility limits plans, the proof without
+resources suffices.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from planner_core.problem import Bools
 
 
 def resource_bound(search: Search) -> Iterator[None]:
-    """Bound plans without a search."""
+    """Bound plans quickly, without a search."""
     search.best.lower(quick_bound(search.problem, search.best.reward))
     yield
 
 
 def choices(search: Search) -> Iterator[None]:
-    """Look for first plans among choices of tasks, and near those of agility alone."""
+    """Seek first plans among choices of tasks, and near the best plan of agility alone."""
     yield from search.engine(ResourceSearch).choose(lambda: tasks_alone(search))
 
 
 def tasks_alone(search: Search) -> Bools:
-    """Let agility alone bound the plans; return the tasks of the best plan then."""
+    """Bound plans by agility alone; return the tasks of the best plan found under agility alone."""
     engine, best = search.engine(ResourceSearch), search.best
-    # With starts 15 s apart this takes all the time there is: 253 of 290 after 20 s with all of
-    # it, 280 with a quarter (docs/bounds.md). Its plans are not for this problem: they are not
+    # With starts 15 s apart this would use up all the time: 253 of 290 after 20 s with all of it,
+    # 280 with a quarter (docs/bounds.md). Its plans are not plans of this problem, so they are not
     # reported.
     quiet = search.budget.part(TUNING.beginning, ignored)
     free = Incumbent(replace(search.problem, use_resources=False), quiet, best.gap)
-    # What turns in motion forbid beside is for the search with limits to see.
+    # What turns in motion forbid besides is left to the search with limits.
     solution = search.beside(free, search.seed, like=at_rest(free.problem)).solved()
     if solution.proven is not None:
         best.lower(solution.proven)
@@ -51,13 +51,13 @@ def tasks_alone(search: Search) -> Bools:
 
 
 def windows_and_choices(search: Search) -> Iterator[None]:
-    """Search windows and choices of tasks in turn, from the best plan that others have found."""
+    """Alternate windows and choices of tasks, from the best plan that other strategies found."""
     engine, best = search.engine(ResourceSearch), search.best
     known = best.reward
     while search.is_promising:
         if best.reward > known:
-            # Programs leave room for windows: under clouds 231.9 for 231.6, with rewards of 1 to
-            # 10 2,505 for 2,499 of 2,534 after 20 CPU seconds.
+            # Windows improve plans of programs: under clouds 231.9 instead of 231.6, with rewards
+            # of 1 to 10 2,505 instead of 2,499 of 2,534 after 20 CPU seconds.
             engine.alternating_search.adopt(best.plan)
         engine.search(engine.alternating_search, TUNING.rounds)
         known = best.reward
@@ -65,7 +65,7 @@ def windows_and_choices(search: Search) -> Iterator[None]:
 
 
 def own_contacts(search: Search) -> Iterator[None]:
-    """Look for better plans with the contacts of the best one, by a small program."""
+    """Seek better plans with the contacts of the best one, by a small program."""
     engine = search.engine(ResourceSearch)
     while search.is_promising:
         engine.fix_own_contacts()
@@ -73,12 +73,12 @@ def own_contacts(search: Search) -> Iterator[None]:
 
 
 def choices_from_the_best(search: Search) -> Iterator[None]:
-    """Replan the whole day by choices of tasks from the best plan, until that leads no further.
+    """Replan the whole day by choices of tasks from the best plan, until it is no longer improved.
 
-    Windows and choices in turn leave such plans too soon: with 1,000 targets and `paper` four of
-    six draws are within half a percent after 1 to 2.3 CPU seconds so, in place of one; three of
-    four with 500 within two percent after 2 in place of 6. To come back after each better plan
-    gains nothing more, and with rewards of 1 to 10 costs a tenth of the time to 1 %.
+    Alternating with windows leaves such plans too soon: with 1,000 targets and `paper`, four of six
+    draws are within half a percent after 1 to 2.3 CPU seconds this way, instead of one; three of
+    four with 500 are within two percent after 2 s instead of 6. Returning to this after each better
+    plan gains nothing more, and with rewards of 1 to 10 costs a tenth of the time to 1 %.
     """
     engine, best = search.engine(ResourceSearch), search.best
     choices = ChoiceSearch(search.problem, engine.unit, search.seed, search.budget.stop)
@@ -112,12 +112,12 @@ def multipliers(search: Search) -> Iterator[None]:
 
 
 def programs(search: Search) -> Iterator[None]:
-    """Relax sets of contacts, and look for better plans by small programs with one of them."""
+    """Relax sets of contacts, and seek better plans by small programs with one of them."""
     engine = search.engine(ResourceSearch)
     while search.is_promising:
         is_new = engine.relax_sets(engine.resource_ascent, engine.alternating_search)
         if is_new:
-            # How low the bound gets by them says which sets are worth a program.
+            # How far they lower the bound decides which sets are worth a program.
             engine.ascend(engine.resource_ascent, TUNING.tries)
         if not engine.fix_contacts(is_last=False) and not is_new:
             engine.fix_contacts(is_last=True)

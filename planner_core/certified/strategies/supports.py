@@ -1,4 +1,4 @@
-"""Which problems a strategy is for."""
+"""Predicates for the problems that a strategy supports."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner_core.problem import COLLECT, Problem
 
 
 def is_shared(problem: Problem) -> bool:
-    """Whether several satellites have something to do."""
+    """Whether several satellites have opportunities."""
     return sum(len(satellite) > 0 for satellite in problem.satellites) > 1
 
 
@@ -22,7 +22,7 @@ def is_large(problem: Problem) -> bool:
 
 
 def is_fleet(problem: Problem) -> bool:
-    """Whether several satellites share so much that the whole program is too large."""
+    """Whether several satellites have so many opportunities that the whole program is too large."""
     return is_shared(problem) and is_large(problem)
 
 
@@ -37,22 +37,22 @@ def has_free_starts(problem: Problem) -> bool:
 
 
 def has_free_starts_alone(problem: Problem) -> bool:
-    """Whether they may, and neither battery nor recorder counts."""
+    """Whether starts are free, and neither battery nor recorder counts."""
     return has_free_starts(problem) and not problem.use_resources
 
 
 def has_free_starts_with_resources(problem: Problem) -> bool:
-    """Whether they may, and battery and recorder count."""
+    """Whether starts are free, and battery and recorder count."""
     return has_free_starts(problem) and problem.use_resources
 
 
 def has_limits(problem: Problem) -> bool:
-    """Whether battery, recorder or motion bound plans, among the starts of opportunities."""
+    """Whether battery, recorder or turns in motion limit plans, with starts of opportunities."""
     return not has_free_starts(problem) and (problem.use_resources or problem.turns_in_motion)
 
 
 def at_rest(problem: Problem) -> Problem:
-    """Return the problem with satellites that turn between lines of sight at rest."""
+    """Return the problem with slews from rest to rest."""
     return replace(
         problem,
         satellites=tuple(
@@ -63,9 +63,9 @@ def at_rest(problem: Problem) -> Problem:
 
 
 def is_free(problem: Problem) -> bool:
-    """Whether agility alone counts, among the starts of opportunities.
+    """Whether agility alone counts, with starts of opportunities.
 
-    Pins fit in by themselves only where turning is transitive.
+    Kept tasks need no further care only if precedence is transitive.
     """
     if problem.use_resources or problem.turns_in_motion or has_free_starts(problem):
         return False
@@ -73,52 +73,52 @@ def is_free(problem: Problem) -> bool:
 
 
 def is_free_satellite(problem: Problem) -> bool:
-    """Whether agility alone counts, and one satellite has something to do."""
+    """Whether agility alone counts, and at most one satellite has opportunities."""
     return is_free(problem) and not is_shared(problem)
 
 
 def has_choice_of_starts(problem: Problem) -> bool:
-    """Whether such a satellite may start at several times in an access."""
+    """Whether one satellite with agility alone may start at several times in an access."""
     return is_free_satellite(problem) and problem.offers_choice
 
 
 def has_one_start_each(problem: Problem) -> bool:
-    """Whether such a satellite may start at one time in each access."""
+    """Whether one satellite with agility alone may start at one time only in each access."""
     return is_free_satellite(problem) and not problem.offers_choice
 
 
 def is_free_fleet(problem: Problem) -> bool:
-    """Whether agility alone counts, and several satellites have something to do."""
+    """Whether agility alone counts, and several satellites have opportunities."""
     return is_free(problem) and is_shared(problem)
 
 
 def is_small_free_fleet(problem: Problem) -> bool:
-    """Whether such a fleet is searched in streams, and ends with cutting planes."""
+    """Whether a fleet with agility alone is searched in streams, and ends with cutting planes."""
     return is_free_fleet(problem) and len(problem.opportunities) <= TUNING.small_fleet
 
 
 def is_small_free_fleet_with_choice(problem: Problem) -> bool:
-    """Whether such a fleet may start at several times in an access."""
+    """Whether such a small fleet may start at several times in an access."""
     return is_small_free_fleet(problem) and problem.offers_choice
 
 
 def is_large_free_fleet(problem: Problem) -> bool:
-    """Whether such a fleet is too large for that."""
+    """Whether a fleet with agility alone is too large for streams and cutting planes."""
     return is_free_fleet(problem) and not is_small_free_fleet(problem)
 
 
 def has_steady_worth(problem: Problem) -> bool:
-    """Whether limits bound plans, and images have one worth, whenever they come down."""
+    """Whether limits apply, and images are worth the same whenever they come down."""
     return has_limits(problem) and not has_half_life(problem)
 
 
 def is_shared_with_limits(problem: Problem) -> bool:
-    """Whether that holds of several satellites."""
+    """Whether limits apply, worths are steady, and several satellites have opportunities."""
     return has_steady_worth(problem) and is_shared(problem)
 
 
 def fits_a_program(problem: Problem) -> bool:
-    """Whether a program of all images, contacts fixed, takes seconds.
+    """Whether a program of all images, with contacts fixed, takes seconds.
 
     With turns to the sun each pair of near tasks has a column. Contacts that are not taken have
     none: over 36 stations five satellites have 1,600 images among 5,900 opportunities.
@@ -129,49 +129,49 @@ def fits_a_program(problem: Problem) -> bool:
 
 
 def is_small_and_shared(problem: Problem) -> bool:
-    """Whether that holds of several satellites with little to choose from."""
+    """Whether limits apply, worths are steady, and several satellites have few opportunities."""
     return is_shared_with_limits(problem) and not is_large(problem)
 
 
 def is_alone_with_limits(problem: Problem) -> bool:
-    """Whether that holds of one satellite."""
+    """Whether limits apply, worths are steady, and at most one satellite has opportunities."""
     return has_steady_worth(problem) and not is_shared(problem)
 
 
 def is_aging(problem: Problem) -> bool:
-    """Whether limits bound plans, and images lose worth as they age."""
+    """Whether limits apply, and images lose worth as they age."""
     return has_limits(problem) and has_half_life(problem)
 
 
 def is_aging_alone(problem: Problem) -> bool:
-    """Whether images of one satellite do."""
+    """Whether images age, and at most one satellite has opportunities."""
     return is_aging(problem) and not is_shared(problem)
 
 
 def is_aging_but_no_fleet(problem: Problem) -> bool:
-    """Whether images of one satellite do, or of several with little to choose from."""
+    """Whether images age, and one satellite has opportunities, or several have few."""
     return is_aging(problem) and not is_fleet(problem)
 
 
 def is_aging_on_board(problem: Problem) -> bool:
-    """Whether many images of one satellite do, and earn the larger part when they are taken."""
+    """Whether one satellite has many images that age but earn the larger part when taken."""
     is_many = len(problem.opportunities) > TUNING.open_tasks
     return is_aging_alone(problem) and is_many and problem.objective.collected_share > 0.5
 
 
 def is_aging_in_programs(problem: Problem) -> bool:
-    """Whether they do, and programs know by which contact each comes down."""
+    """Whether images age, and programs include by which contact each comes down."""
     return is_aging(problem) and not is_large(problem) and is_transitive(problem)
 
 
 def is_shared_and_aging_in_programs(problem: Problem) -> bool:
-    """Whether that holds of several satellites with few tasks."""
+    """Whether such programs apply to several satellites with few tasks."""
     is_small = len(problem.opportunities) <= TUNING.open_tasks
     return is_shared(problem) and is_small and is_aging_in_programs(problem)
 
 
 def is_within_reach(problem: Problem) -> bool:
-    """Whether the whole program is worth a try at last."""
+    """Whether the whole program is worth trying as the last resort."""
     if has_free_starts(problem):
         return False
     if has_half_life(problem):

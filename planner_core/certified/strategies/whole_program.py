@@ -49,7 +49,7 @@ class WholeProgram:
     moves_per_task: float = 30.0
 
     def solve(self, problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
-        """Return the best plan; the same one for the same seed where the budget suffices."""
+        """Return the best plan; the same one for the same seed if the budget suffices."""
         best = Incumbent(problem, budget, gap, bound=Bound(value=np.inf, proof="milp"))
         for plan in _starts(problem, budget):
             best.offer(brought_down(problem, plan, budget))
@@ -67,8 +67,8 @@ class WholeProgram:
                 )
             )
             return best.solution()
-        # The limits are strict, which no linear program can say. The first search lets plans touch
-        # them, so that its bound is true; a second one stays clear where the first plan does touch.
+        # The limits are strict, which no linear program can express. The first search lets plans
+        # touch them, so that its bound holds; if its plan is not valid, a second one stays inside.
         outcome = self._search(problem, budget, seed, best, TOUCHING)
         if outcome.is_infeasible:
             return best.solution()
@@ -100,18 +100,18 @@ class WholeProgram:
 
 
 def exhaust(search: Search) -> Iterator[None]:
-    """Leave what remains to the whole program.
+    """Leave the rest to the whole program.
 
-    Of 240 small missions drawn for the tests all were closed with it, and 222 without.
+    Of 240 small missions drawn for the tests, all were closed with it, and 222 without.
     """
     _ask(search, 1.0)
     yield
 
 
 def images_by_contact(search: Search) -> Iterator[None]:
-    """Ask the whole program first, for a part of the time.
+    """Solve the whole program first, for a part of the time.
 
-    Four satellites over 80 targets, images halved in an hour, earn 59.16 and 64.71 after ten CPU
+    Four satellites over 80 targets with a half-life of one hour earn 59.16 and 64.71 after ten CPU
     seconds, and 59.02 and 62.63 without; bounds fall from 59.44 and 64.92 to 59.31 and 64.84.
     """
     _ask(search, TUNING.beginning)
@@ -119,7 +119,7 @@ def images_by_contact(search: Search) -> Iterator[None]:
 
 
 def _ask(search: Search, share: float) -> None:
-    """Ask the whole program for a plan and a bound, for a share of the time that is left."""
+    """Seek a plan and a bound by the whole program, for a share of the time that is left."""
     best = search.best
     best.report("HiGHS")
     quiet = search.budget.part(share, report=ignored)
@@ -131,9 +131,9 @@ def _ask(search: Search, share: float) -> None:
 
 
 def relaxation_bound(problem: Problem, budget: Budget, seed: int) -> Bound:
-    """Return what the linear relaxation of the whole program says that no plan exceeds."""
-    # To count what stays on board takes three times as long, and lowers nothing: fractions of
-    # images come down.
+    """Return the bound by the linear relaxation of the whole program."""
+    # Counting images that stay on board takes three times as long, and lowers nothing: fractions
+    # of images come down.
     model = plan_program(problem, "antichain", TOUCHING, on_board="worth the same")
     engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
     _cut(engine, problem, model, TUNING.patience, _unwatched)
@@ -145,7 +145,7 @@ def _unwatched(_reward: float, _bound: float) -> None:
 
 
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:
-    """Return the plans of the quick solvers, the quickest one whatever the time."""
+    """Return the plans of the quick solvers; that of the quickest whatever the budget."""
     if budget.is_cancelled:
         return []
     plans = [Rule().solve(problem, Budget(), 0).plan]
@@ -156,7 +156,7 @@ def _starts(problem: Problem, budget: Budget) -> list[Plan]:
 
 
 def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watch: Watch) -> None:
-    """Add the cliques that the fractional optimum breaks, while that leads anywhere."""
+    """Add violated clique cuts while they lower the bound noticeably."""
     bounds: list[float] = []
     for _ in range(rounds):
         taken = engine.relaxed()
@@ -185,7 +185,7 @@ def _plan_of(problem: Problem, outcome: Outcome) -> Plan:
 
 
 def _columns(best: Incumbent, model: PlanProgram) -> Floats | None:
-    """Return the plan as values of the integer columns, or None where it is not valid."""
+    """Return the plan as values of the integer columns, or None if it is not valid."""
     if not best.is_valid:
         return None
     down = model.down[_brought_down(best)]
@@ -196,7 +196,7 @@ def _columns(best: Incumbent, model: PlanProgram) -> Floats | None:
 
 
 def _brought_down(best: Incumbent) -> list[int]:
-    """Return the opportunities of the plan whose images earn what they do on the ground."""
+    """Return the opportunities of the plan whose images are downlinked."""
     images = best.judge(best.plan).collected.values()
     return [best.plan.actions[i.position].opportunity for i in images if i.is_downlinked]
 
@@ -224,7 +224,7 @@ def _repaired(problem: Problem, plan: Plan) -> Plan:
 
 
 class _Reporter:
-    """Passes on what HiGHS knows, a few times a second."""
+    """Reports the progress of HiGHS, a few times a second."""
 
     def __init__(self, budget: Budget) -> None:
         self._budget = budget
@@ -232,7 +232,7 @@ class _Reporter:
         self._last_s = 0.0
 
     def __call__(self, reward: float, bound: float) -> None:
-        """Report the best objective so far and the bound, unless that was done just now."""
+        """Report the best objective so far and the bound, unless the last report is too recent."""
         now_s = time.monotonic()
         if now_s - self._last_s < PAUSE_S:
             return
@@ -250,7 +250,7 @@ class _Reporter:
         )
 
     def _fraction(self, reward: float, bound: float) -> float:
-        """Return the share of the time that is over, or without a limit of the bound reached."""
+        """Return the share of the time that is over; without a limit, of the bound reached."""
         if self._limit_s:
             return 1.0 - (self._budget.remaining_s() or 0.0) / self._limit_s
         return min(1.0, max(0.0, reward / bound)) if bound > 0.0 else 1.0
