@@ -100,6 +100,7 @@ class SatelliteChoices:
         if self.network.must_deliver and len(images):
             end = min(levels.end, int(levels.delivered[images[-1]]))
             levels = levels._replace(end=end)
+        # Totals a little above the goal show whether it can be reached, and cost little memory.
         limit = int(1.15 * max(goal, 0)) + 16 + int(weight.max(initial=0))
         idle, after = least_energy(network, weight, limit)
         top = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])

@@ -163,7 +163,7 @@ class AgilitySearch:
     def cut(self, max_rounds: int) -> Generator[None, None, Master]:
         """Add cutting planes, a round per slice, until they lead no further; return the master."""
         self.shrink()
-        priced = self.best.bound.value + self.best.unit
+        start = self.best.bound.value + self.best.unit
         master = Master(self._rest, self._rows, self.budget, self.seed)
         bounds: list[float] = []
         for number in range(1, max_rounds + 1):
@@ -181,7 +181,7 @@ class AgilitySearch:
             gap = max(bounds[-1] - self.best.better, 1e-9)
             # Until the relaxation is nearly as low as the subgradient's bound, zero-half cuts
             # mislead.
-            num_added = master.cut(taken, with_zero_half_cuts=bounds[-1] <= priced + 0.2 * gap)
+            num_added = master.cut(taken, with_zero_half_cuts=bounds[-1] <= start + TUNING.near * gap)
             is_stalled = (
                 len(bounds) > TUNING.patience
                 and bounds[-1 - TUNING.patience] - bounds[-1] < TUNING.little * gap
