@@ -1,4 +1,4 @@
-"""Whether a scenario's orbits are good enough to plan with, and what a reader is warned of."""
+"""Checks that a scenario's orbits are good enough to plan with, and warnings for the reader."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _MOST_NAMED: Final = 20
 
 
 def check_propagation(scenario: Scenario) -> None:
-    """Refuse the first satellite whose orbit does not reach over the horizon.
+    """Refuse the first satellite whose orbit does not cover the horizon.
 
     Raises
     ------
     PropagationFailed
-        SGP4 cannot carry it through.
+        SGP4 fails within the horizon.
     InvalidScenario
-        ``orbit_outside_span`` where an ephemeris ends before, or begins later.
+        ``orbit_outside_span`` if an ephemeris does not cover the horizon without a gap.
     """
     for position, satellite in enumerate(scenario.satellites):
         try:
@@ -41,8 +41,8 @@ def check_element_age(scenario: Scenario) -> None:
     Raises
     ------
     InvalidScenario
-        A satellite in low orbit is more than 30 days from its epoch at some time of the
-        horizon: its place along the orbit is then a matter of minutes, not of seconds.
+        A satellite in low orbit is more than 30 days from its epoch at some time in the
+        horizon: its position along the orbit is then uncertain by minutes, not seconds.
     """
     if scenario.allow_old_elements:
         return
@@ -66,7 +66,7 @@ def check_element_age(scenario: Scenario) -> None:
 
 
 def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
-    """Return what a reader should know about element sets, the Earth's orientation and starts."""
+    """Return warnings about element sets, built-in types, the Earth's orientation and starts."""
     ages = (_age_warning(satellite, scenario.horizon) for satellite in scenario.satellites)
     warnings = [warning for warning in ages if warning is not None]
     generic = sorted({s.spacecraft for s in scenario.satellites if s.spacecraft in _GENERIC})
@@ -107,8 +107,8 @@ def _age_warning(satellite: Satellite, horizon: Horizon) -> str | None:
 
 
 def _greatest_age_days(satellite: Satellite, horizon: Horizon) -> float:
-    """Return how far from its epoch an element set is used at most, before or after."""
+    """Return the longest time from its epoch, before or after, at which an element set is used."""
     if isinstance(satellite.orbit, OrbitEphemeris):
-        return 0.0  # it is used within its own span alone
+        return 0.0  # it is only used within its own span
     epoch_s = horizon.offset_s(satellite.orbit.epoch)
     return max(epoch_s, horizon.duration_s - epoch_s) / 86400.0

@@ -1,6 +1,6 @@
-"""Limits of geometry as smooth functions of time, and the instants where they change sign.
+"""Geometric limits as smooth functions of time, and the instants at which they change sign.
 
-Every limit compares the angle between two moving vectors with a bound, so all of them are
+Every limit compares the angle between two moving vectors with a bound, so all have the form
 
     g(t) = sign * cos(angle between x(t) and y(t)) - threshold,    inside where g >= 0.
 
@@ -99,8 +99,8 @@ def limit_value(limit: Limit, cubic: Floats, site: Floats, t: float) -> Value:
     cubic
         One interval of a track. Shape ``(4, 9)``.
     site
-        Position (m) and vertical of the site, and the middle meridians of the two limits of
-        local time. Shape ``(4, 3)``.
+        Position (m) and vertical of the site, and the middle meridians of the two local-time
+        limits. Shape ``(4, 3)``.
     """
     code, sign, threshold = limit
     x, dx = (site[1, 0], site[1, 1], site[1, 2]), (0.0, 0.0, 0.0)
@@ -120,7 +120,7 @@ def limit_value(limit: Limit, cubic: Floats, site: Floats, t: float) -> Value:
         x = (site[0, 0], site[0, 1], site[0, 2])
         y, dy = _cross(y, dy), _cross(y, _rate_of_rate(cubic, _POSITION, t))
     elif code == SUN_EXCLUSION:
-        # The sun against the way from the place to the satellite: beyond it, seen from there.
+        # The sun's direction against the one from site to satellite, the reversed line of sight.
         y = (y[0] - site[0, 0], y[1] - site[0, 1], y[2] - site[0, 2])
         x, dx = _at(cubic, _SUN, t), _rate(cubic, _SUN, t)
     elif code == HEADING:
@@ -136,8 +136,8 @@ def limit_value(limit: Limit, cubic: Floats, site: Floats, t: float) -> Value:
     rate = (_dot(dx, y) + _dot(x, dy)) * scale - cosine * stretch
     g, g_rate = sign * cosine - threshold, sign * rate
     if code == SUNLIT:
-        # In the light while the sun is above the Earth's limb as the satellite sees it; the
-        # limb's cosine changes with the height.
+        # Sunlit while the sun is above the Earth's limb as seen from the satellite; the limb's
+        # cosine changes with the altitude.
         ratio2 = min(EARTH_RADIUS_M * EARTH_RADIUS_M / yy, 1.0 - 1e-12)
         limb = math.sqrt(1.0 - ratio2)
         g += limb
@@ -149,7 +149,7 @@ def limit_value(limit: Limit, cubic: Floats, site: Floats, t: float) -> Value:
 def _root(
     limit: Limit, cubic: Floats, site: Floats, a: float, b: float, g_a: float, g_b: float
 ) -> float:
-    """Return where g changes sign between ``a`` and ``b``: Newton, or bisection if it leaves."""
+    """Return where g changes sign between ``a`` and ``b``, by Newton's method or bisection."""
     t = a + (b - a) * g_a / (g_a - g_b)
     for _ in range(80):
         g, rate = limit_value(limit, cubic, site, t)
@@ -172,8 +172,8 @@ def _turn(
 ) -> float:
     """Return an instant near the extremum where g has the other sign, or ``_NO_TURN``.
 
-    Both ends have the same sign and head for the other one. The two tangents bound g only
-    where it has no inflection, which is trusted on a quarter of the interval or less.
+    At both ends g has the same sign and heads for the other one. The two tangents bound g only
+    if it has no inflection in between, which is assumed on a quarter of the interval or less.
     """
     trusted_s = 0.25 * (b - a) + 1e-9
     g_a, rate_a = at_a
@@ -208,8 +208,8 @@ def crossings(
 ) -> int:
     """Write the instants (0 to ``step_s``) where a limit changes sign; return how many.
 
-    Complete where g has at most one extremum in the interval: a pair of crossings between
-    nodes (a grazing pass, a short gap) shows as rates that head for the other sign.
+    Complete if g has at most one extremum in the interval: a pair of crossings between nodes
+    (a grazing pass, a short gap) shows in rates at both ends that head for the other sign.
     """
     inside = at_0[0] >= 0.0
     if inside != (at_1[0] >= 0.0):

@@ -1,8 +1,8 @@
-"""The Earth's orientation that no formula gives: UT1 and the pole, from a daily table.
+"""The part of the Earth's orientation that no formula gives: UT1 and the pole, from a daily table.
 
-The package ships the IERS table from 2000 on, with a year of predictions, which
-``planner_core/data/make_eop.py`` renews. Outside the table its end values are held, as
-``EarthOrientation.covers`` tells: a second of UT1 is 465 m at the equator, but UT1 is never
+The package ships the IERS table from 2000 on, with a year of predictions;
+``planner_core/data/make_eop.py`` renews it. Outside the table its end values are held, which
+``EarthOrientation.covers`` detects: a second of UT1 is 465 m at the equator, but UT1 is never
 more than 0.9 s from UTC.
 """
 
@@ -45,7 +45,7 @@ class EarthOrientation:
 
     @classmethod
     def none(cls) -> EarthOrientation:
-        """Return a table that says UT1 is UTC and the pole does not move."""
+        """Return a table in which UT1 equals UTC and the pole does not move."""
         zero = np.zeros(1)
         return cls(mjd=zero, tai_utc_s=zero, dut1_s=zero, xp_rad=zero, yp_rad=zero)
 
@@ -55,11 +55,11 @@ class EarthOrientation:
         Parameters
         ----------
         jd_midnight, fraction
-            Julian date in UTC as a day ending in .5 and days since. ``fraction`` is ``(n,)``.
+            Julian date in UTC: a day ending in .5, and the days since. ``fraction`` is ``(n,)``.
         """
         mjd = jd_midnight - _MJD_ZERO + fraction
-        # UT1 - TAI runs smoothly; UT1 - UTC jumps at leap seconds, and so may not be
-        # interpolated over midnight.
+        # UT1 - TAI is smooth; UT1 - UTC jumps at leap seconds, so it must not be interpolated
+        # across midnight.
         ut1_tai_s = np.interp(mjd, self.mjd, self.dut1_s - self.tai_utc_s)
         row = np.clip(np.searchsorted(self.mjd, mjd, side="right") - 1, 0, len(self.mjd) - 1)
         return (
@@ -75,7 +75,7 @@ class EarthOrientation:
         return np.asarray(self.tai_utc_s[row])
 
     def covers(self, horizon: Horizon) -> bool:
-        """Return whether the table reaches over the whole horizon."""
+        """Return whether the table covers the whole horizon."""
         first, last = (sum(julian_date(t)) - _MJD_ZERO for t in (horizon.start, horizon.end))
         return bool(self.mjd[0] <= first and last <= self.mjd[-1])
 

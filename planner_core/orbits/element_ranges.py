@@ -1,4 +1,4 @@
-"""What an element set may hold, whatever format it came in."""
+"""Limits on the values of an element set, whatever format it came in."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from planner_core.errors import Fault, InvalidElements
 LARGEST_NORAD_CAT_ID = 999_999_999
 LONGEST_TEXT = 200
 MOST_SETS = 100_000
-"""Of one file; all that is in orbit is about a third of this."""
-# The largest drag term or derivative that a TLE can write; nothing real comes near it.
+"""In one file; everything in orbit is about a third of this."""
+# The largest drag term or derivative that a TLE can express; no real one comes near it.
 _LARGEST_RATE = 1e9
 _FIRST_YEAR, _LAST_YEAR = 1957, 2199
 
 
 def require_in_range(elements: OrbitElements, pointers: Mapping[str, str]) -> None:
-    """Refuse an element set that no orbit round the Earth can have.
+    """Refuse an element set that no orbit about the Earth can have.
 
     Parameters
     ----------
@@ -52,14 +52,14 @@ def too_many_sets() -> Fault:
 
 
 def is_plain_text(text: str) -> bool:
-    """Return whether a name can be stored and shown: no control characters, no endless line."""
+    """Return whether a name can be stored and shown: printable, and not too long."""
     return len(text) <= LONGEST_TEXT and text.isprintable()
 
 
 def epoch_key(elements: Orbit) -> tuple[int | str, datetime]:
-    """Return what tells two element sets apart: the satellite and the epoch.
+    """Return the key that identifies an element set: its satellite and its epoch.
 
-    Number 0 stands for "not catalogued", so there the name tells satellites apart.
+    Number 0 means "not catalogued"; such satellites are identified by name or object id.
     """
     return (elements.norad_cat_id or elements.name or elements.object_id, elements.epoch)
 

@@ -1,9 +1,9 @@
-"""A satellite's path over the horizon: SGP4, or an ephemeris, at nodes, and cubics between them.
+"""A satellite's path over the horizon: SGP4 or an ephemeris at nodes, and cubics between them.
 
 SGP4 runs once a minute (twice for eccentric orbits). Between nodes a cubic Hermite
 polynomial is within 0.4 m of SGP4 in low Earth orbit, which moves an access edge by less than
-3 ms. Its rates are those of the positions themselves: SGP4's own velocity differs from the
-rate of its position, by 3 m/s in a Molniya orbit, and would cost 13 m between nodes.
+3 ms. Its rates are derivatives of the positions themselves: SGP4's own velocity differs from
+the rate of its position, by 3 m/s in a Molniya orbit, which would cost 13 m between nodes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _STEP_S = 60.0
 _ECCENTRIC_STEP_S = 30.0
 _ECCENTRIC = 0.1
 _STENCIL = 7
-"""Nodes that each rate is taken from: exact to the sixth order."""
+"""Nodes that each rate is computed from: exact to sixth order."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,7 +38,7 @@ class Ephemeris:
     """States at evenly spaced nodes ``k * step_s`` that cover the horizon exactly.
 
     Positions in metres, velocities in m/s, each of shape ``(num_nodes, 3)``; Earth-fixed
-    velocities are relative to the turning Earth.
+    velocities are relative to the rotating Earth.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Ephemeris:
 
     @property
     def node_s(self) -> Floats:
-        """Return the instants of the nodes."""
+        """Instants of the nodes, in seconds."""
         return np.arange(len(self.gmst_rad), dtype=np.float64) * self.step_s
 
     def state_teme(self, t_s: Floats) -> tuple[Floats, Floats]:
@@ -149,14 +149,14 @@ def propagate(
     Parameters
     ----------
     orientation
-        UT1 and the pole; the table shipped with the package unless given.
+        UT1 and the pole; by default the table shipped with the package.
 
     Raises
     ------
     PropagationFailed
         SGP4 gives an error code, or no finite state, at some node.
     InvalidScenario
-        ``orbit_outside_span`` where an ephemeris does not cover the horizon.
+        ``orbit_outside_span`` if an ephemeris does not cover the horizon.
     """
     orientation = orientation or shipped()
     t_s, jd, fraction = _nodes(satellite, horizon)
@@ -186,7 +186,7 @@ def propagate(
 
 
 def check_propagation(satellite: Satellite, horizon: Horizon) -> None:
-    """Raise where ``propagate`` would; cheaper."""
+    """Raise if ``propagate`` would, at less cost."""
     if isinstance(satellite.orbit, OrbitEphemeris):
         require_covered(satellite.orbit, horizon)
         return
@@ -195,7 +195,7 @@ def check_propagation(satellite: Satellite, horizon: Horizon) -> None:
 
 
 def _nodes(satellite: Satellite, horizon: Horizon) -> tuple[Floats, float, Floats]:
-    """Return the nodes: seconds since the horizon's start, and as Julian dates in UTC."""
+    """Return the nodes in seconds since the horizon's start, and as Julian dates in UTC."""
     eccentric = satellite.orbit.eccentricity > _ECCENTRIC
     step_s = _ECCENTRIC_STEP_S if eccentric else _STEP_S
     num_intervals = max(_STENCIL - 1, math.ceil(horizon.duration_s / step_s - 1e-9))

@@ -1,8 +1,7 @@
-"""Frames: TEME (where SGP4 lives), the Earth-fixed ITRF, and geodetic coordinates.
+"""Frames: TEME (SGP4's own), the Earth-fixed ITRF, and geodetic coordinates.
 
-Vectors are in metres unless they are directions. Angles of the Earth's orientation are the
-model's own: GMST of 1982 in UT1, then small-angle polar motion, as Vallado (AIAA 2006-6753)
-prescribes for SGP4.
+Vectors are in metres unless they are directions. The Earth's orientation is the one that Vallado
+(AIAA 2006-6753) prescribes for SGP4: GMST of 1982 in UT1, then small-angle polar motion.
 """
 
 from __future__ import annotations
@@ -52,8 +51,8 @@ def gmst82_rad(jd_midnight: float, fraction: Floats) -> Floats:
     slow_s = (
         67310.54841 + 8640184.812866 * centuries + 0.093104 * centuries**2 - 6.2e-6 * centuries**3
     )
-    # The formula's 876600 h per century are one turn a day: only the part of the day is added,
-    # since the whole turns would cost digits. Julian days begin at noon, hence the half.
+    # The formula's 876600 h per century are one rotation a day: only the part of the day is added,
+    # as whole rotations would cost digits. Julian days begin at noon, hence the half.
     start_s = slow_s[:1] % 86400.0
     seconds = start_s + (slow_s - slow_s[:1]) + 86400.0 * (fraction - 0.5)
     return np.asarray(seconds * (2.0 * np.pi / 86400.0))
@@ -62,7 +61,7 @@ def gmst82_rad(jd_midnight: float, fraction: Floats) -> Floats:
 def teme_to_itrf(
     position: Floats, velocity: Floats, gmst_rad: Floats, xp_rad: Floats, yp_rad: Floats
 ) -> tuple[Floats, Floats]:
-    """Return Earth-fixed position and velocity relative to the turning Earth.
+    """Return Earth-fixed position and velocity relative to the rotating Earth.
 
     Parameters
     ----------
@@ -120,7 +119,7 @@ def itrf_to_geodetic(position: Floats) -> tuple[Floats, Floats, Floats]:
     x, y, z = position[:, 0], position[:, 1], position[:, 2]
     across = np.hypot(x, y)
     sine, cosine = _latitude(across, z)
-    # This form of the altitude is as good at the poles as at the equator.
+    # This form of the altitude is as accurate at the poles as at the equator.
     alt_m = across * cosine + z * sine - EARTH_RADIUS_M * np.sqrt(1.0 - _E2 * sine**2)
     return np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(sine, cosine)), alt_m
 
@@ -137,7 +136,7 @@ def geodetic_normal(position: Floats) -> Floats:
 def _latitude(across: Floats, z: Floats) -> tuple[Floats, Floats]:
     """Return sine and cosine of the geodetic latitude, by Bowring's method.
 
-    Two turns are exact to 1e-12 rad from the ground to the geostationary belt.
+    Two iterations are exact to 1e-12 rad from the ground to the geostationary belt.
     """
     ratio = EARTH_POLAR_RADIUS_M / EARTH_RADIUS_M
     reduced = latitude = _normalised(z, across * ratio)

@@ -1,4 +1,4 @@
-"""What maps show of a satellite: the points below it, and from where a station can reach it."""
+"""What maps show of a satellite: the points below it, and where a station can see it."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ def sub_points(ephemeris: Ephemeris, t_s: Floats) -> tuple[Floats, Floats, Float
     Parameters
     ----------
     t_s
-        Instants in the horizon. Shape ``(n,)``, as each part of the answer.
+        Instants in the horizon. Shape ``(n,)``, like each result.
     """
     position_m, _ = ephemeris.state_itrf(t_s)
     return frames.itrf_to_geodetic(position_m)
 
 
 def visibility_ring(station: GroundStation, altitude_m: float) -> tuple[Floats, Floats]:
-    """Return the border of the points over which a satellite stands within a station's limits.
+    """Return the border of the area over which a satellite is within a station's limits.
 
     Parameters
     ----------
     station
-        Its elevation mask and its least elevation both count.
+        Its elevation mask and its minimum elevation both count.
     altitude_m
-        Of the satellite above the ellipsoid; above the station's own.
+        Of the satellite above the ellipsoid; greater than the station's.
 
     Returns
     -------
@@ -59,10 +59,10 @@ def visibility_ring(station: GroundStation, altitude_m: float) -> tuple[Floats, 
 
 
 def _at_altitude(start_m: Floats, direction: Floats, altitude_m: float) -> Floats:
-    """Return where rays from inside reach an altitude.
+    """Return where rays that start below an altitude reach it.
 
-    Points of one altitude lie on an ellipsoid to within metres: scaled to a unit sphere, that
-    is a quadratic equation.
+    Points of equal altitude lie on an ellipsoid to within metres; scaled to a unit sphere, that
+    gives a quadratic equation.
     """
     axes_m = np.array([frames.EARTH_RADIUS_M] * 2 + [frames.EARTH_POLAR_RADIUS_M]) + altitude_m
     p, d = start_m / axes_m, direction / axes_m

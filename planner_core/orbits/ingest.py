@@ -1,6 +1,6 @@
-"""Files of orbits in any form we take: which form it is, and what stands in it.
+"""Orbit files in any supported format: detecting the format, and reading the contents.
 
-Codes of a file that cannot be read as a whole: ``unsupported_media_type``, ``empty_file``,
+Codes of a file that cannot be read at all: ``unsupported_media_type``, ``empty_file``,
 ``not_utf8``, ``not_json``, ``not_csv``, ``not_xml``, ``xml_forbidden``, ``no_elements``,
 ``too_many_rows``.
 Codes of single sets: those of `tle.parse_tle`, `omm.elements_from_omm` and `oem`, and
@@ -50,7 +50,7 @@ _TEXT_FORMS: dict[str, Callable[[str], Read]] = {
 _XML_TYPES = ("application/xml", "text/xml")
 _OEM = "CCSDS_OEM_VERS"
 _OEM_START = re.compile(rf"^\s*{_OEM}", re.MULTILINE)
-_HEAD = 4096  # characters within which a message says what it is, after its comments
+_HEAD = 4096  # characters within which a message says what it is, leading comments included
 _KVN_START = re.compile(r"(CCSDS_[A-Z_]+|[A-Z][A-Z0-9_]*)[ \t]*=|COMMENT[ \t\n]")
 
 
@@ -66,7 +66,7 @@ class Entry:
     row
         Line of the file where the set starts (line 1 of a TLE), or None for JSON and XML.
     warnings
-        What was put right on the way in.
+        What was corrected on reading.
     """
 
     elements: Orbit
@@ -77,16 +77,16 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ingested:
-    """What a file held: the sets accepted, in order, and everything that was refused."""
+    """The sets of a file that were accepted, in order, and faults of all that was refused."""
 
     entries: tuple[Entry, ...] = ()
     faults: tuple[Fault, ...] = ()
 
 
 def read_elements(data: bytes, media_type: str) -> Ingested:
-    """Return the element sets of a file; nothing in it can make this raise.
+    """Return the element sets of a file; never raises, whatever the file contains.
 
-    Of two sets for the same satellite and epoch the first is kept and the second is a fault.
+    Of two sets for the same satellite and epoch the first is kept, and the second is a fault.
 
     Parameters
     ----------

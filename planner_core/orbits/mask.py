@@ -1,8 +1,8 @@
 """Contacts above a station's azimuth-elevation mask.
 
-The mask has kinks, so its windows are cut from those above its lowest point: the pass is
-sampled every few seconds and at every knot it crosses, so that the mask is straight between
-samples, and searched for crossings and near misses there.
+The mask has kinks, so its windows are cut from those above its lowest point. Each pass is
+sampled every few seconds and at every knot it crosses, so that the mask is linear between
+samples, where crossings and near misses are searched for.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
 
 def mask_elevation_deg(mask: Mask, azimuth_deg: Floats) -> Floats:
-    """Return the mask's elevation in each direction, linear between knots round the compass.
+    """Return the mask's elevation at each azimuth, linear between knots round the compass.
 
     >>> mask_elevation_deg(((0.0, 10.0), (180.0, 20.0)), np.array([90.0, 270.0, 360.0]))
     array([15., 15., 10.])
@@ -39,7 +39,7 @@ def windows_above_mask(ephemeris: Ephemeris, station: Sites, mask: Mask, windows
     Parameters
     ----------
     station
-        One place.
+        One site.
     windows
         Start and end in seconds. Shape ``(n, 2)``.
 

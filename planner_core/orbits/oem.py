@@ -1,7 +1,7 @@
-"""Orbit Ephemeris Messages (CCSDS 502.0-B, section 5): from KVN or XML, and into tidy KVN.
+"""Orbit Ephemeris Messages (CCSDS 502.0-B, section 5), read from KVN or XML, written as tidy KVN.
 
-Read are states in TEME, EME2000, GCRF or an ITRF, round the Earth, in UTC, TAI, TT or GPS time.
-Accelerations and covariances are left out: nothing here asks for them.
+States may be in TEME, EME2000, GCRF or an ITRF, about the Earth, in UTC, TAI, TT or GPS time.
+Accelerations and covariances are ignored: nothing here needs them.
 
 Codes: ``oem_syntax``, ``oem_missing_key``, ``oem_unsupported``, ``oem_epoch``,
 ``oem_number_format``, ``oem_times``, ``oem_too_few_states``, ``omm_text``,
@@ -27,10 +27,10 @@ from planner_core.orbits.element_ranges import is_plain_text
 from planner_core.orbits.omm_files import Lines, kvn_messages
 
 MOST_STATES: Final = 100_000
-"""Of one message: ten weeks of a state a minute."""
+"""In one message: ten weeks at one state a minute."""
 
 MOST_LINES: Final = 2 * MOST_STATES
-"""Of one message, with covariances."""
+"""In one message, covariances included."""
 
 _GM_KM3_S2: Final = 398_600.4418
 _LOWEST_KM, _HIGHEST_KM = 6_400.0, 500_000.0
@@ -43,21 +43,21 @@ _MUST_STAND: Final = (
     "OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM", "START_TIME", "STOP_TIME"
 )  # fmt: skip
 _DEFAULT_DEGREE: Final = 7
-"""Where a header does not say how to interpolate: by HERMITE, from the four states about it."""
+"""If a header does not say how to interpolate: by HERMITE, from the four states around."""
 _MOST_DEGREE: Final = 31
 _COLUMNS: Final = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OemSegment:
-    """A segment as it stands in a file.
+    """A segment as read from a file.
 
     Attributes
     ----------
     meta, rows
-        Keywords with their values, and their lines where the form has lines.
+        Keywords with their values, and their line numbers if the format has lines.
     states
-        Epoch and the six numbers of each state, as texts, and its line.
+        Epoch and the six numbers of each state, as text, and its line number.
     """
 
     meta: dict[str, str] = field(default_factory=dict)
@@ -71,7 +71,7 @@ def ephemeris_of(segments: Sequence[OemSegment]) -> OrbitEphemeris:
     Raises
     ------
     InvalidElements
-        With the line of what is wrong, where the form has lines.
+        With the line at fault, if the format has lines.
     """
     if not segments:
         raise _refused("oem_syntax", "The message holds no segment")
@@ -109,7 +109,7 @@ def read_oem(lines: Iterable[str]) -> OrbitEphemeris:
     Raises
     ------
     InvalidElements
-        Where it cannot be read.
+        If it cannot be read.
     """
     messages = list(kvn_messages(lines, MOST_LINES))
     if len(messages) != 1:
@@ -123,7 +123,7 @@ def kvn_segments(lines: Lines) -> list[OemSegment]:
     Raises
     ------
     InvalidElements
-        ``oem_syntax`` for a line that has no place, ``too_many_rows``.
+        ``oem_syntax`` for a line that does not belong where it stands, ``too_many_rows``.
     """
     segments: list[OemSegment] = []
     part = "header"
@@ -154,9 +154,9 @@ def kvn_segments(lines: Lines) -> list[OemSegment]:
 
 
 def tidy_lines(orbit: OrbitEphemeris) -> list[str]:
-    """Return the lines of the message in KVN, as it is stored: all that counts, in UTC.
+    """Return the lines of the message in KVN as stored: everything that is used, in UTC.
 
-    Read again they give the same states to the last bit.
+    Reading them back gives the same states to the last bit.
     """
     lines = [
         "CCSDS_OEM_VERS = 2.0",
@@ -188,7 +188,7 @@ def tidy_lines(orbit: OrbitEphemeris) -> list[str]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outline:
-    """What an ephemeris is of, when it may be used, and how many states it has."""
+    """The object of an ephemeris, when it may be used, and how many states it has."""
 
     object_name: str
     object_id: str
@@ -198,14 +198,14 @@ class Outline:
 
 
 def outline_of(tidy: Sequence[str]) -> Outline:
-    """Return the outline of tidy lines, whose states need not be read for it."""
+    """Return the outline of tidy lines, without reading their states."""
     header: dict[str, str] = {}
     num_headers = 0
     for line in tidy:
         key, equals, value = line.partition("=")
         if equals or line.startswith("META_"):
             num_headers += 1
-        # Of several segments the first tells the start, the last the stop.
+        # The start is that of the first segment, the stop that of the last.
         if equals and not (key == "USEABLE_START_TIME " and key in header):
             header[key] = value.strip()
     return Outline(
@@ -321,7 +321,7 @@ def _instant(text: str, row: int | None) -> datetime:
 
 
 def _to_utc_s(system: str, first: datetime, row: int | None) -> float:
-    """Return what has to be added to instants of a time system; leap seconds within count not."""
+    """Return the seconds to add to reach UTC; leap seconds after ``first`` are ignored."""
     if system == "UTC":
         return 0.0
     jd, day = frames.julian_date(first)

@@ -1,4 +1,4 @@
-"""Positions between the states of an Orbit Ephemeris Message, as its header says, in TEME."""
+"""Positions in TEME between the states of an Orbit Ephemeris Message, as its header says."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 
 _TT_TAI_S: Final = 32.184
 _SLACK_S: Final = 1e-3  # between segments that touch, and at the ends
-_AT_ONCE: Final = 4096  # instants, which bounds the memory
+_AT_ONCE: Final = 4096  # instants in a batch, to bound the memory
 
 
 def positions_teme_km(
@@ -35,7 +35,7 @@ def positions_teme_km(
     t_s
         Seconds since the horizon's start, ascending. Shape ``(n,)``.
     turned
-        Sidereal time and the pole at these instants, which tie TEME to the Earth.
+        Sidereal time and the pole at these instants, which relate TEME to the ITRF.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def positions_teme_km(
     require_covered(orbit, horizon)
     position = np.empty((len(t_s), 3))
     for segment in orbit.segments:
-        # Where two segments meet, the later one counts.
+        # At an instant where two segments meet, the later one is used.
         since_s = (segment.start - horizon.start).total_seconds() - _SLACK_S
         until_s = (segment.stop - horizon.start).total_seconds() + _SLACK_S
         rows = np.flatnonzero((t_s >= since_s) & (t_s <= until_s))
@@ -93,7 +93,7 @@ def interpolated_km(segment: EphemerisSegment, t_s: Floats) -> Floats:
     """
     is_hermite = segment.interpolation == "HERMITE"
     size = (segment.degree + 1) // 2 if is_hermite else segment.degree + 1
-    # As many states before an instant as after it, or the outermost ones.
+    # As many states before an instant as after it, except near the segment's ends.
     right = np.searchsorted(segment.t_s, t_s, side="right")
     left = np.clip(right - size // 2 - size % 2, 0, len(segment.t_s) - size)
     rows = left[:, None] + np.arange(size)
@@ -115,7 +115,7 @@ def interpolated_km(segment: EphemerisSegment, t_s: Floats) -> Floats:
 def _lagrange(nodes: Floats, x: Floats) -> tuple[Floats, Floats]:
     """Return Lagrange's polynomials at ``x``, and the slope of each at its own node.
 
-    Shapes ``(n, k)`` for nodes and answers, ``(n, 1)`` for ``x``.
+    Shapes ``(n, k)`` for nodes and results, ``(n, 1)`` for ``x``.
     """
     size = nodes.shape[1]
     basis, slope = np.ones_like(nodes), np.zeros_like(nodes)

@@ -1,9 +1,9 @@
 """One Orbit Mean-Elements Message (CCSDS 502.0-B-3) as a mapping of its keywords.
 
-Only SGP4 mean elements in TEME and UTC round the Earth are taken; what a message says
-otherwise is refused by name. Keywords that a mapping leaves out keep these meanings, as in
-the JSON and CSV of CelesTrak: theory SGP4, frame TEME, time UTC, centre EARTH. Keywords
-that say nothing about the orbit are ignored.
+Only SGP4 mean elements about the Earth, in TEME and UTC, are accepted; anything else is
+refused, naming the keyword. Keywords that a mapping leaves out have these defaults, as in the
+JSON and CSV of CelesTrak: theory SGP4, frame TEME, time UTC, centre EARTH. Keywords that say
+nothing about the orbit are ignored.
 
 ``SEMI_MAJOR_AXIS`` in place of ``MEAN_MOTION`` is refused: SGP4 needs the mean motion, and
 an axis does not say which of several mean motions it stands for.
@@ -76,7 +76,7 @@ def elements_from_omm(fields: Mapping[str, object]) -> OrbitElements:
     Parameters
     ----------
     fields
-        CCSDS keywords and their values: numbers, or text that reads as one.
+        CCSDS keywords and their values; numbers may be given as text.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Files of Orbit Mean-Elements Messages: JSON, CSV, XML and KVN, each into plain mappings.
+"""Files of Orbit Mean-Elements Messages (JSON, CSV, XML and KVN), read into plain mappings.
 
 JSON and CSV come from catalogues that add their own columns, so unknown keywords are
 ignored there. XML and KVN are the standard's own forms: an unknown keyword is refused, and
-the metadata that say what the elements mean must stand in each message.
+the metadata that say what the elements mean must be present in each message.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ _MOST_ELEMENTS = 30 * MOST_SETS
 _MOST_ATTRIBUTES = 15 * MOST_SETS
 _ATTRIBUTES = ("version", "units", "parameter")
 _PIECE_BYTES = 65_536
-_MOST_QUIET_PIECES = 3  # a parser may wait for a second one, and more, before it reads on
+_MOST_QUIET_PIECES = 3  # a parser may wait for two pieces or more before it goes on
 _NDM_TEXTS = frozenset(("COMMENT", "MESSAGE_ID"))
 _LONGEST_SHOWN = 40
 
@@ -84,9 +84,9 @@ class Message:
     fields
         Keywords and values.
     pointer
-        JSON pointer to the message (for XML: its place among the messages), or None.
+        JSON pointer to the message (for XML: its index among the messages), or None.
     row, rows
-        Line where the message starts, and the line of each keyword, where the form has lines.
+        Line where the message starts, and the line of each keyword, if the format has lines.
     """
 
     fields: Mapping[str, object]
@@ -169,7 +169,7 @@ def _header_fault(header: list[str], row: int) -> Fault | None:
 def read_kvn(text: str) -> Read:
     """Return the messages of a text of ``KEYWORD = value [unit]`` lines.
 
-    A message starts at its ``CCSDS_OMM_VERS``. A bad line refuses its message only.
+    A message starts at its ``CCSDS_OMM_VERS``. A bad line invalidates only its own message.
     """
     parts = kvn_messages(io.StringIO(text), _MOST_LINES)
     return _sorted_out(_kvn_message(lines) for lines in parts)
@@ -201,7 +201,7 @@ def _kvn_message(lines: Lines) -> Message | Fault:
 def kvn_messages(text: Iterable[str], most_lines: int) -> Iterator[Lines]:
     """Yield the lines of each message, numbered from 1; comments and blank lines are left out.
 
-    Of a message that is too long one line more than the limit is kept.
+    A message that is too long is cut to one line more than the limit.
     """
     lines: Lines = []
     for row, line in enumerate(text, start=1):
@@ -223,7 +223,7 @@ def read_xml(elements: Iterable[Element]) -> Read:
 
 
 def xml_messages(data: bytes) -> list[Element] | Fault:
-    """Return the messages of a document: its root, or what stands in its ``ndm``.
+    """Return the messages of a document: its root, or the children of an ``ndm`` root.
 
     Document types are refused, and with them entities of every kind.
     """
@@ -244,7 +244,7 @@ def xml_messages(data: bytes) -> list[Element] | Fault:
 
 
 class _Builder(TreeBuilder):
-    """Builds a document that is neither deeper nor longer than one of messages can be."""
+    """Builds a document; refuses one that is deeper or longer than messages can be."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -254,7 +254,7 @@ class _Builder(TreeBuilder):
         self._quiet_pieces = 0
 
     def note_piece(self) -> None:
-        """Refuse what does not end: the parser would keep all of a tag, and build it at once."""
+        """Refuse a tag or comment without end: the parser would buffer and build it whole."""
         self._quiet_pieces += 1
         if self._quiet_pieces > _MOST_QUIET_PIECES:
             raise ValueError(f"a tag or comment is longer than {_PIECE_BYTES} bytes")

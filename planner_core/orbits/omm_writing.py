@@ -1,8 +1,8 @@
-"""Orbit Mean-Elements Messages out: JSON, CSV, XML and KVN, of one element set or of many.
+"""Orbit Mean-Elements Messages written as JSON, CSV, XML and KVN, for one element set or many.
 
 JSON and CSV are as CelesTrak serves them. XML (an ``ndm`` of ``omm`` messages) and KVN are the
-standard's own forms (CCSDS 502.0, version 2.0, which readers of 3.0 take as well). What is
-written here, `omm_files` reads back to the same element sets.
+standard's own forms (CCSDS 502.0, version 2.0, which readers of 3.0 accept too). `omm_files`
+reads all of them back to the same element sets.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def write_json(messages: Sequence[Outgoing]) -> str:
 
 
 def write_csv(messages: Sequence[Outgoing]) -> str:
-    """Return a table of messages; of none, nothing. Names that look like formulas are guarded."""
+    """Return a table of messages, empty for none; names that look like formulas are guarded."""
     rows = [
         {key: guarded(v) if isinstance(v, str) else v for key, v in fields.items()}
         for fields in (omm_from_elements(message.elements) for message in messages)
@@ -110,7 +110,7 @@ def _header(message: Outgoing) -> Iterator[tuple[str, object]]:
 
 
 def _metadata(fields: dict[str, object]) -> Iterator[tuple[str, object]]:
-    # The standard wants a word where nothing is known.
+    # The standard requires a value even if nothing is known.
     for key in ("OBJECT_NAME", "OBJECT_ID"):
         yield key, fields[key] or "UNKNOWN"
     yield from _METADATA.items()

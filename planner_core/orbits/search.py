@@ -34,15 +34,15 @@ def find_windows(
     thresholds: Floats,
     stop: Bytes,
 ) -> tuple[Ints, Floats]:
-    """Return every window in which all limits hold, place by place, ascending in time.
+    """Return every window in which all limits hold, site by site, ascending in time.
 
     Parameters
     ----------
     track, step_s
         Cubics of each interval, ``(num_intervals, 4, 9)``, and the length of an interval.
     coarse, fine
-        Caps: unit vector, and cosine of the radius outside which no place can meet the
-        limits, for each ``GROUP`` of intervals and for each interval. Shape ``(k, 4)``.
+        Caps: unit vector, and cosine of the radius outside which no site can meet the limits,
+        for each ``GROUP`` of intervals and for each interval. Shape ``(k, 4)``.
     sites
         Position, vertical and two meridians (see ``limit_value``). Shape ``(n, 4, 3)``.
     codes, signs, thresholds
@@ -142,8 +142,8 @@ def _events_of_interval(
     """Return how many limits hold at the interval's start, and the number of events after it.
 
     ``value`` keeps each limit's g and rate at node ``value_node`` from one interval to the
-    next. An interval in which some limit never holds has no events, and its other limits are
-    not looked at: then the count is -1.
+    next. If some limit never holds in the interval, the remaining limits are not examined and the
+    result is -1 and no events.
     """
     holding, num_events = 0, 0
     instants = value[-1]

@@ -1,4 +1,4 @@
-"""Element sets as SGP4 takes them: the only place that knows python-sgp4's units."""
+"""Element sets as SGP4 takes them: the only module that knows python-sgp4's units."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def epoch_jd(epoch: datetime) -> tuple[float, float]:
     """Return the Julian date of an epoch: that of its midnight, and the fraction of the day.
 
     A TLE gives its epoch to 1e-8 day (864 microseconds). The fraction of such an epoch is
-    the very number that the TLE printed, so that an OMM made from it gives the same record.
+    exactly the number in the TLE, so that an OMM made from it gives the same record.
     """
     elapsed = epoch.astimezone(UTC) - _MIDNIGHT_1950
     fraction = (elapsed - timedelta(days=elapsed.days)) / timedelta(days=1)
@@ -53,6 +53,6 @@ def satrec(elements: OrbitElements) -> Satrec:
         elements.mean_motion_rev_day / _MIN_PER_RAD_DAY,
         math.radians(elements.raan_deg),
     )
-    # The sum above is good to 20 microseconds: enough for sun and moon, not for flight.
+    # The sum above is good to 20 microseconds: enough for sun and moon, not for propagation.
     record.jdsatepoch, record.jdsatepochF = midnight_jd, fraction
     return record

@@ -42,7 +42,7 @@ class Sites:
 
     @classmethod
     def of(cls, points: Sequence[_Point]) -> Sites:
-        """Return the places of targets or stations, in their order."""
+        """Return the sites of targets or stations, in their order."""
         lon, lat, alt = (
             np.array([getattr(point, name) for point in points], dtype=np.float64)
             for name in ("lon_deg", "lat_deg", "alt_m")
@@ -55,7 +55,7 @@ class Sites:
         return len(self.position_m)
 
     def at(self, rows: npt.NDArray[np.integer]) -> Sites:
-        """Return the places in these rows (repeats allowed)."""
+        """Return the sites in these rows (repeats allowed)."""
         return Sites(
             position_m=self.position_m.take(rows, axis=0),
             up=self.up.take(rows, axis=0),
@@ -67,14 +67,14 @@ class Sites:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
-    """What holds between one satellite and one place at one instant, one row each.
+    """The geometry between a satellite and a site at an instant, one row for each pair.
 
     Attributes
     ----------
     off_nadir_deg, elevation_deg, azimuth_deg, range_m
-        At the satellite; at the ground; from north over east; between both.
+        At the satellite; at the site; at the site, from north over east; between both.
     sun_elevation_deg, in_eclipse
-        Of the sun at the place; whether the satellite is in the Earth's shadow.
+        Of the sun at the site; whether the satellite is in the Earth's shadow.
     """
 
     off_nadir_deg: Floats
@@ -86,7 +86,7 @@ class View:
 
 
 def view(ephemeris: Ephemeris, sites: Sites, t_s: Floats, nadir: Nadir) -> View:
-    """Return the geometry of row ``i``'s place at ``t_s[i]``. Shape ``(n,)``."""
+    """Return the geometry of row ``i``'s site at ``t_s[i]``. Shape ``(n,)``."""
     position, _ = ephemeris.state_itrf(t_s)
     vertical = frames.geodetic_normal(position) if nadir == "geodetic" else frames.unit(position)
     sight = position - sites.position_m
@@ -104,13 +104,13 @@ def view(ephemeris: Ephemeris, sites: Sites, t_s: Floats, nadir: Nadir) -> View:
 
 
 def azimuth_elevation_deg(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> tuple[Floats, Floats]:
-    """Return where the satellite stands above each site: azimuth [0, 360) and elevation."""
+    """Return the satellite's azimuth, in [0, 360), and elevation as seen from each site."""
     position, _ = ephemeris.state_itrf(t_s)
     return _azimuth_elevation_deg(position - sites.position_m, sites)
 
 
 def elevations_deg(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> Floats:
-    """Return how high the satellite stands above each site."""
+    """Return the satellite's elevation as seen from each site."""
     position, _ = ephemeris.state_itrf(t_s)
     east, north, up = _east_north_up(position - sites.position_m, sites)
     return np.degrees(np.arctan2(up, np.hypot(east, north)))
@@ -127,22 +127,22 @@ def _east_north_up(sight: Floats, sites: Sites) -> tuple[Floats, Floats, Floats]
 
 
 def line_of_sight_teme(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> Floats:
-    """Return unit vectors from the satellite to row ``i``'s place, inertial. ``(n, 3)``."""
+    """Return unit vectors from the satellite to row ``i``'s site, inertial. ``(n, 3)``."""
     position, _ = ephemeris.state_itrf(t_s)
     return ephemeris.to_teme(frames.unit(sites.position_m - position), t_s)
 
 
 def los_rate_deg_s(ephemeris: Ephemeris, sites: Sites, t_s: Floats) -> Floats:
-    """Return how the lines of sight turn, in deg/s and inertial axes. Shape ``(n, 3)``.
+    """Return the angular velocities of lines of sight, in deg/s, inertial. Shape ``(n, 3)``.
 
-    The rotation from half a second before to half a second after, as far as the horizon goes. Only
-    the direction counts: it says nothing of the roll about the line of sight.
+    From the rotation between half a second before and half a second after, clipped to the horizon.
+    It does not include rotation about the line of sight.
     """
     before_s = np.maximum(t_s - _HALF_STEP_S, 0.0)
     after_s = np.minimum(t_s + _HALF_STEP_S, ephemeris.duration_s)
     before = line_of_sight_teme(ephemeris, sites, before_s)
     after = line_of_sight_teme(ephemeris, sites, after_s)
-    # So small an angle is its sine.
+    # An angle this small equals its sine.
     turned = np.degrees(np.cross(before, after))
     return np.asarray(turned / (after_s - before_s)[:, None])
 

@@ -1,9 +1,9 @@
-"""Where the sun stands, and the Earth's shadow.
+"""The direction to the sun, and the Earth's shadow.
 
 The direction is the Astronomical Almanac's low-precision formula (0.01 deg from 1950 to
 2050), in axes of mean equator and equinox of date, which differ from TEME by nutation only
 (0.005 deg). The shadow is a cylinder behind a sphere of the Earth's equatorial radius: the
-sun counts as a point, there is no penumbra and no refraction.
+sun is a point, so there is no penumbra, and there is no refraction.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 _PATH_STEP_S = 3600.0
-"""The sun moves by 0.04 deg in it: what lies between two directions is a straight line."""
+"""The sun moves by 0.04 deg in that time, so linear interpolation between directions suffices."""
 
 
 def sun_direction_teme(jd_midnight: float, fraction: Floats) -> Floats:
@@ -30,7 +30,7 @@ def sun_direction_teme(jd_midnight: float, fraction: Floats) -> Floats:
     Parameters
     ----------
     jd_midnight, fraction
-        Julian date in UTC as a day and days since. ``fraction`` has shape ``(n,)``.
+        Julian date in UTC: a day, and the days since. ``fraction`` has shape ``(n,)``.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def sun_direction_teme(jd_midnight: float, fraction: Floats) -> Floats:
 
 
 def sun_path(horizon: Horizon) -> SunPath:
-    """Return where the sun stands during a horizon."""
+    """Return the direction to the sun over a horizon."""
     num_steps = max(1, math.ceil(horizon.duration_s / _PATH_STEP_S))
     midnight, start = julian_date(horizon.start)
     t_s = np.linspace(0.0, horizon.duration_s, num_steps + 1)

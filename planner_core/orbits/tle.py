@@ -1,15 +1,15 @@
 """One two-line element set: its columns, read and written.
 
-A line has 69 columns; every field has its own, and the last is a checksum. Numbers of
-satellites above 99999 are written in Alpha-5: a letter (not I, not O) for the first two digits.
+A line has 69 columns; every field has its own, and the last is a checksum. Catalogue numbers
+above 99999 are written in Alpha-5: a letter (not I, not O) for the first two digits.
 
 Blanks for zeros
 ----------------
 Some programs, the paper's among them, pad with blanks where the format has zeros: in the
 catalogue number, the year and day of the epoch (``19  1.00000000``), and the eccentricity.
-Such a line is read as if the zeros stood there, its checksum is recomputed, and the reading
-carries the warning ``tle_normalised``. Only on such a line, judged by itself, is a wrong or
-missing checksum forgiven: everywhere else it means that a digit is wrong.
+Such a line is read as if it had the zeros, its checksum is recomputed, and the reading has the
+warning ``tle_normalised``. A wrong or missing checksum is accepted only on such a line, whatever
+the other line is: everywhere else it means that a digit is wrong.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class _Field:
     has_zeros: bool = False  # padded with zeros by the format, with blanks by some programs
 
 
-# A decimal point has its own column: the lookahead holds it there.
+# A decimal point has its own column, which the lookahead enforces.
 _ANGLE = r"(?=...\.) *\d*\.\d+ *"
 _POWER = r"[ +-]\d{5}[ +-]\d"
 _NUMBER = _Field("catalogue number", 2, 7, r"[0-9A-HJ-NP-Z]\d{4}| +\d+", has_zeros=True)
@@ -226,7 +226,7 @@ def _elements(one: dict[str, str], two: dict[str, str]) -> OrbitElements:
 def theory_of_type(ephemeris_type: str) -> str:
     """Return the sentence that refuses an ephemeris type other than 0.
 
-    Sources disagree about 1, 2 and 3, and for some of them 2 means another mean motion than
+    Sources disagree about 1, 2 and 3, and in some of them 2 means a different mean motion from
     the one SGP4 takes; guessing wrong would move the satellite by degrees.
     """
     name = {"4": "SGP4-XP", "6": "special perturbations"}.get(ephemeris_type, "another theory")
@@ -265,13 +265,13 @@ def _power(text: str) -> float:
 
 
 def format_tle(elements: OrbitElements) -> tuple[str, str]:
-    """Return the two lines of an element set that a TLE can carry.
+    """Return the two lines of an element set that a TLE can express.
 
     Raises
     ------
     ValueError
-        A value needs more digits than its columns have (epochs may be 1 microsecond off),
-        lies outside what they can say, or the number is above 339999.
+        A value needs more digits than its columns have (epochs may be 1 microsecond off) or
+        lies outside what they can express, or the catalogue number is above 339999.
     """
     try:
         require_in_range(elements, _POINTERS | dict.fromkeys(_RATES, "/tle/0"))
@@ -326,7 +326,7 @@ def _epoch_text(epoch: datetime) -> str:
 
 
 def _close(text: str, value: float) -> bool:
-    # Values that came through other formats carry the noise of binary fractions.
+    # Values that came through other formats carry binary rounding errors.
     return math.isclose(float(text), value, rel_tol=1e-12, abs_tol=1e-15)
 
 

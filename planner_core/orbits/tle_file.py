@@ -36,16 +36,16 @@ class _Line:
 
     @property
     def kind(self) -> str:
-        """Return ``1`` or ``2`` for an element line, ``name`` for any other."""
+        """``1`` or ``2`` for an element line, ``name`` for any other."""
         is_element = self.text[0] in "12" and self.text[1:2] in (" ", "\t")
         return self.text[0] if is_element and len(self.text) > _LONGEST_NAME else "name"
 
 
 def read_tle_text(text: str) -> tuple[list[TleRecord], list[Fault]]:
-    """Return the element sets of a text (TLE, 2LE or 3LE), and what was refused.
+    """Return the element sets of a text (TLE, 2LE or 3LE), and faults of what was refused.
 
     Blank lines and lines that start with ``#`` are skipped; a name may start with ``0``
-    and a blank. After a refused set, reading goes on at the next line that can start one.
+    and a blank. After a refused set, reading resumes at the next line that can start one.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def _lines(text: str) -> Iterator[_Line]:
 
 
 class _Grouping:
-    """One pass over the lines; ``name`` is a name line still without its element set."""
+    """One pass over the lines; ``_name`` is a name line whose element set is still to come."""
 
     def __init__(self, lines: list[_Line]):
         self._lines = lines
@@ -101,7 +101,7 @@ class _Grouping:
         return 1
 
     def _is_swapped(self, at: int) -> bool:
-        # In "2 1 2" the first line may be a stray one before a whole set: the number tells.
+        # In "2 1 2" the first line may be stray, before a whole set: the catalogue number decides.
         two, one = self._lines[at], self._lines[at + 1]
         third = self._lines[at + 2] if at + 2 < len(self._lines) else None
         if one.kind != "1" or two.text[2:7] != one.text[2:7]:
@@ -135,7 +135,7 @@ class _Grouping:
 
 
 def _start(line: _Line) -> str:
-    # A line 2 that was cut short is still one when it stands after a line 1.
+    # A line 2 that was cut short still counts as one after a line 1.
     return line.text[0] if line.text[1:2] in (" ", "\t") else ""
 
 
