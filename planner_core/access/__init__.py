@@ -1,1 +1,1 @@
-"""When satellites see places: limits, eligibility, accesses, and the opportunities made of them."""
+"""When satellites see sites: limits, eligibility, accesses, and opportunities made from them."""

@@ -1,7 +1,7 @@
 """Who may image a target, and when: sensor types, release and due times.
 
-None of it is geometry. Accesses are found for the satellites that carry what a target asks for,
-and cut to the time between its release and its due time; all that follows sees what is left.
+None of it is geometry. Accesses to a target are found only for satellites with the sensor type it
+asks for, and cut to the time between its release and due times; later steps see only the rest.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _ROUNDING_MS = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Eligibility:
-    """What targets ask for beside geometry, as columns; shape ``(num_targets,)`` each.
+    """What targets ask for besides geometry, as columns; shape ``(num_targets,)`` each.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Eligibility:
         )
 
     def in_time(self, accesses: Accesses) -> Accesses:
-        """Return the accesses to targets as far as they lie between release and due times."""
+        """Return the accesses to targets, cut to the time between release and due times."""
         start_s = np.maximum(accesses.start_s, self.release_s[accesses.site])
         end_s = np.minimum(accesses.end_s, self.due_s[accesses.site])
         kept = start_s < end_s

@@ -1,4 +1,4 @@
-"""Opportunities at spans that are given: what was planned or flown, wherever accesses say now."""
+"""Opportunities at given spans: what was planned or flown, even if accesses have moved since."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from planner_core.problem import COLLECT, CONTACT, Ints, Longs, Opportunities
 from planner_core.problem.slew import TIME_TOLERANCE_S
 
 MOST_MOVED_S: Final = 60.0
-"""By newer elements, an edge of an access; what sticks out further is not the same pass."""
+"""How far newer elements may move an access's edge; a task further out is not in that pass."""
 
 
 class Given(NamedTuple):
@@ -30,14 +30,14 @@ class Given(NamedTuple):
 
 
 class WithGiven(NamedTuple):
-    """A table with the tasks that were given.
+    """A table with the given tasks added.
 
     Attributes
     ----------
     origin
-        The row of the table before that each row is, or is nearest to. Shape ``(n,)``.
+        For each row, the same row of the original table, or the nearest one. Shape ``(n,)``.
     missing
-        Which of the given tasks have no access.
+        Indices of the given tasks that have no access.
     """
 
     table: Opportunities
@@ -46,9 +46,10 @@ class WithGiven(NamedTuple):
 
 
 def with_given(scenario: Scenario, table: Opportunities, given: Sequence[Given]) -> WithGiven:
-    """Return the table with each of these tasks at its own span, in an access that it touches.
+    """Return the table with each of these tasks added at its own span, in an access that it fits.
 
-    What is there already stays as it is. An access is as long as what is given in it.
+    Existing rows stay as they are, and a task that is one of them is not added again. The access of
+    an added row is extended to contain its task.
     """
     found, missing = {}, []
     for number, task in enumerate(given):
@@ -81,14 +82,14 @@ def with_given(scenario: Scenario, table: Opportunities, given: Sequence[Given])
 
 
 def table_of(scenario: Scenario, given: Sequence[Given]) -> Opportunities:
-    """Return the table of these tasks alone, in order, each with an access as long as itself."""
+    """Return the table of these tasks alone, in this order, each with an access of its own span."""
     columns = _columns(given, np.arange(len(given)))
     columns["access_start_s"], columns["access_end_s"] = columns["start_s"], columns["end_s"]
     return _seen(scenario, given, columns)
 
 
 def _touched(table: Opportunities, task: Given) -> Longs:
-    """Return the rows whose access a task touches, or is at most so far from."""
+    """Return the rows whose access, widened by ``MOST_MOVED_S`` at each end, contains a task."""
     return np.flatnonzero(
         (table.satellite == task.satellite)
         & (table.kind == task.kind)

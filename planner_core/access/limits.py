@@ -1,4 +1,4 @@
-"""What a place must meet to be seen: the limits of sensors, targets and stations as a table."""
+"""What a site must meet to be seen: the limits of sensors, targets and stations as a table."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ class TargetLimits:
     lon_deg
         Shape ``(n,)``.
     bounds
-        The targets' numbers by field name, NaN for none. Shape ``(n,)`` each.
+        Numeric limits by field name, NaN for none. Shape ``(n,)`` each.
     choices
-        The targets' wishes by field name, "any" for none. Shape ``(n,)`` each.
+        Look sides and orbit directions by field name, "any" for none. Shape ``(n,)`` each.
     """
 
     lon_deg: Floats
@@ -88,15 +88,15 @@ class Limits:
     nadir
         The vertical that off-nadir angles are measured from.
     widest_off_nadir_deg, lowest_elevation_deg
-        The loosest bounds over all sites: no place is seen outside them.
+        The loosest bounds over all sites: no site is seen outside them.
     codes, signs
         Which angle (``orbits.crossings``), and +1 for "at most" or -1 for "at least".
         Shape ``(m,)``.
     thresholds
         ``sign * cos(bound)``. Shape ``(n, m)``.
     meridians
-        Where the sun stands over the equator in the middle of the local time that the sensor,
-        and the target itself, allow. Shape ``(n, 2, 3)``.
+        Direction of the sun's meridian in the middle of the local-time span that the sensor
+        allows, and of the one that the target allows. Shape ``(n, 2, 3)``.
     masks
         Azimuth-elevation masks, one per site (empty for none), or no masks at all.
     """
@@ -138,8 +138,8 @@ class Limits:
         )
         sun_exclusion_deg = np.full_like(own.lon_deg, _number(sensor.sun_exclusion_deg))
         rows = [
-            # The search leaves an interval at the first limit that never holds in it: where it is
-            # night, at once.
+            # The search drops an interval at the first limit that never holds in it; with the sun
+            # first it drops nights at once.
             _at_most(codes.SUN_ELEVATION, 90.0 - highest("sun_elevation_min_deg")),
             _at_most(codes.OFF_NADIR, np.where(widest < 90.0, widest, np.nan)),
             _at_most(codes.ELEVATION, 90.0 - elevation),
@@ -174,7 +174,7 @@ class Limits:
 
     @classmethod
     def above_horizon(cls, num_sites: int) -> Limits:
-        """Return the limits of bare visibility."""
+        """Return the limits of bare visibility: above the horizon."""
         return cls._above(np.zeros(num_sites), ())
 
     @classmethod
@@ -203,10 +203,10 @@ def _at_least(code: int, bound_deg: Floats) -> Row:
 
 
 def _local_time(from_h: Floats, to_h: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
-    """Return the greatest angle between the sun's meridian and a middle one, and that middle.
+    """Return half the width, in degrees, of the arc of allowed sun meridians, and its middle.
 
-    Local time is 12 h when the sun stands over the target's own meridian, and moves with the
-    sun's longitude: so the allowed hours are an arc of sun longitudes.
+    Local time is 12 h when the sun is over the target's meridian and changes with the sun's
+    longitude, so the allowed hours are an arc of sun longitudes.
     """
     span_h = (to_h - from_h) % 24.0
     half_deg = np.where(span_h > 0.0, span_h * _DEG_PER_HOUR / 2.0, np.nan)
@@ -222,7 +222,7 @@ class _Table(TypedDict):
 
 
 def _table(rows: Sequence[Row]) -> _Table:
-    """Return the limits that bind any place at all; NaN is no limit."""
+    """Return the limits that bind at least one site; NaN means no limit."""
     used = [row for row in rows if not np.isnan(row[2]).all()]
     cosines = [sign * np.cos(np.radians(bound)) for _, sign, bound in used]
     num_sites = len(rows[0][2])

@@ -1,4 +1,4 @@
-"""Accesses become opportunities: collects placed in them, contacts as a whole.
+"""Opportunities from accesses: collects placed inside them, contacts as whole accesses.
 
 Times are counted in whole milliseconds, so that no placement depends on rounding.
 """
@@ -39,7 +39,7 @@ Placed = tuple[Longs, Longs, Longs]
 Columns = dict[str, npt.NDArray[Any]]
 
 MOST_OPPORTUNITIES: Final = 10_000_000
-"""Of one scenario: their table takes two gigabytes while it is made."""
+"""In one scenario: their table takes two gigabytes while it is made."""
 _MS_PER_S: Final = 1000
 _CHUNK: Final = 16_384  # rows whose intermediate results fit the processor's cache
 _SEEN: Final = (
@@ -56,7 +56,7 @@ _SEEN: Final = (
 
 
 def check_number(num_opportunities: int) -> None:
-    """Refuse more opportunities than fit a machine's memory.
+    """Refuse more opportunities than fit in a machine's memory.
 
     Raises
     ------
@@ -79,8 +79,8 @@ def place_collects(
 ) -> Placed:
     """Return the collects that accesses offer.
 
-    Without a spacing, one in the middle of each access; with one, starts ``spacing_s`` apart:
-    from the access's start on, and the last start that still fits, or, aligned to the horizon,
+    Without a spacing: one in the middle of each access. With one: starts ``spacing_s`` apart, from
+    the access's start on, and the last start that still fits; or, if aligned to the horizon, starts
     at multiples of the spacing from the horizon's start.
 
     Returns
@@ -99,19 +99,19 @@ def place_collects(
 
 
 def have_room(accesses: Accesses, targets: Sequence[Target]) -> npt.NDArray[np.bool_]:
-    """Return which accesses last as long as their target's collect. Shape ``(n,)``."""
+    """Return which accesses last at least as long as their target's collect. Shape ``(n,)``."""
     return np.asarray(_room_ms(accesses, targets)[1] >= 0)
 
 
 def _room_ms(accesses: Accesses, targets: Sequence[Target]) -> tuple[Longs, Longs]:
-    """Return how long each access's collect is, and how far it can be moved."""
+    """Return how long each access's collect is, and how far it can be moved, in milliseconds."""
     length_s = np.array([target.collect_s for target in targets], dtype=np.float64)
     length_ms = np.ceil(length_s * _MS_PER_S - 1e-6).astype(np.int64)[accesses.site]
     return length_ms, _ms(accesses.end_s) - _ms(accesses.start_s) - length_ms
 
 
 def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tuple[Longs, Longs]:
-    # Steps are rounded to the millisecond one by one, so half of one may stick out.
+    # Each step is rounded to the millisecond by itself, so half a millisecond may stick out.
     regular = ((room_ms + 0.5) / step_ms).astype(np.int64)
     last_ms = np.minimum(np.rint(regular * step_ms).astype(np.int64), room_ms)
     extra = (room_ms - last_ms > 1).astype(np.int64)
@@ -124,7 +124,7 @@ def _spaced(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tupl
 
 
 def _on_grid(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tuple[Longs, Longs]:
-    # Multiples are rounded to the millisecond one by one, so half of one may fall outside.
+    # Each multiple is rounded to the millisecond by itself, so half of one may lie outside.
     first = np.ceil((start_ms - 0.5) / step_ms).astype(np.int64)
     last = np.floor((start_ms + room_ms + 0.5) / step_ms).astype(np.int64)
     counts = np.maximum(last - first + 1, 0)
@@ -139,7 +139,7 @@ def _on_grid(row: Longs, start_ms: Longs, room_ms: Longs, step_ms: float) -> tup
 def place_contacts(accesses: Accesses, stations: Sequence[GroundStation]) -> Placed:
     """Return the contacts: whole accesses of at least the station's ``min_contact_s``.
 
-    One that is no longer than the station's setup is none: nothing would come down.
+    An access no longer than the station's setup is not offered: nothing would be downlinked.
     """
     shortest_ms = np.array(
         [
@@ -163,7 +163,7 @@ def _ms(instant_s: Floats) -> Longs:
 def rows_of(
     satellite: int, kind: int, accesses: Accesses, first_access: int, placed: Placed
 ) -> Columns:
-    """Return the placed tasks of one satellite as rows of the opportunity table, unseen yet.
+    """Return one satellite's placed tasks as rows of the opportunity table, without geometry yet.
 
     Parameters
     ----------
@@ -188,11 +188,11 @@ def rows_of(
 def in_order(
     parts: Sequence[Columns], target_ids: Sequence[str], station_ids: Sequence[str]
 ) -> Columns:
-    """Return all rows by (start, end, satellite, kind, place's id as text).
+    """Return all rows sorted by (start, end, satellite, kind, site's id as text).
 
-    Accesses are numbered anew as they come up in the table: a number does not depend on accesses
-    that offer nothing, or on what was found together. Empties ``parts`` on the way: a week of a
-    constellation is large.
+    Accesses are renumbered in order of first appearance, so that a number depends neither on
+    accesses that offer nothing nor on what was searched together. Empties ``parts`` on the way, to
+    save memory: a week of a constellation is large.
     """
     whole = {name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])}
     is_collect = whole["kind"] == COLLECT
@@ -210,7 +210,7 @@ def in_order(
 
 
 def _numbered(access: Ints) -> Ints:
-    """Return the numbers 0, 1, … in the order in which these come up for the first time."""
+    """Return these numbers replaced by 0, 1, … in order of first appearance."""
     _, first, own = np.unique(access, return_index=True, return_inverse=True)
     number = np.empty(len(first), dtype=np.int32)
     number[np.argsort(first)] = np.arange(len(first))
@@ -224,10 +224,10 @@ def _rank_of(ids: Sequence[str], site: Ints, wanted: npt.NDArray[np.bool_]) -> L
 
 
 class Described:
-    """The opportunity table while what the satellites see is filled in, one after another.
+    """The opportunity table while its geometry is filled in, satellite by satellite.
 
-    The geometry is two thirds of the table. Filling it in place keeps one copy of it, which
-    counts where a week of a constellation has millions of rows.
+    The geometry is two thirds of the table. Filling it in place keeps a single copy, which
+    matters as a week of a constellation has millions of rows.
     """
 
     def __init__(self, rows: Columns):
@@ -252,7 +252,7 @@ class Described:
         *,
         with_rates: bool = False,
     ) -> None:
-        """Fill in the rows of one satellite and kind, ``with_rates`` of its lines of sight."""
+        """Fill in the rows of one satellite and kind, and rates of lines of sight if asked for."""
         all_rows = np.flatnonzero(
             (self._rows["satellite"] == satellite) & (self._rows["kind"] == kind)
         )

@@ -1,7 +1,7 @@
-"""The opportunities of a scenario that asks for other targets than one before it.
+"""The opportunities of a scenario that differs from an earlier one in its targets only.
 
-Access is most of what a replan would have to compute again, and a replan changes targets at most:
-those that are new are looked for, and the others are as they were.
+Access is most of what a replan would have to compute again. If only targets have changed, accesses
+are searched for new targets only, and the rows of the others are reused.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def opportunities_after(
     Raises
     ------
     PropagationFailed, InvalidScenario, Cancelled
-        As there.
+        As in ``compute_opportunities``.
     """
     if not is_seen_alike(scenario, before):
         return compute_opportunities(scenario, budget)
@@ -65,14 +65,14 @@ def _merged(
     found: ScenarioOpportunities | None,
     fresh: Longs,
 ) -> ScenarioOpportunities:
-    """Return the rows of targets known before and of new ones, in the order of a table.
+    """Return the rows of known and of new targets, in the order of a table.
 
     Parameters
     ----------
     old
-        Where each target stood in the scenario before; -1 for new ones. Shape ``(num_targets,)``.
+        Index of each target in the earlier scenario; -1 for new ones. Shape ``(num_targets,)``.
     fresh
-        The new ones.
+        Indices of the new targets.
     """
     table = known.opportunities
     place = np.full(len(known.target_access), -1, dtype=np.int32)
@@ -87,7 +87,7 @@ def _merged(
     if found is not None:
         new = _columns(found.opportunities)
         new["site"] = fresh[new["site"]].astype(np.int32)
-        new["access"] = new["access"] + np.int32(len(table))  # beyond those that are known
+        new["access"] = new["access"] + np.int32(len(table))  # beyond the known numbers
         parts.append(new)
         access[fresh] = found.target_access
     tasks.check_number(sum(len(part["start_s"]) for part in parts))
@@ -107,7 +107,7 @@ def _columns(table: Opportunities) -> tasks.Columns:
 
 
 def _bare(scenario: Scenario) -> Scenario:
-    """Return what access depends on beside targets."""
+    """Return the parts of a scenario besides targets that its opportunities depend on."""
     return Scenario(
         horizon=scenario.horizon,
         satellites=scenario.satellites,
@@ -128,6 +128,6 @@ def is_seen_alike(scenario: Scenario, before: Scenario) -> bool:
 
 
 def _is_same_site(target: Target, before: Target) -> bool:
-    """Return whether a target is imaged as before, whatever it is worth."""
+    """Return whether a target can be imaged as before; name, reward and catalogue may differ."""
     same = replace(target, name=before.name, reward=before.reward, catalog_id=before.catalog_id)
     return same == before

@@ -1,4 +1,4 @@
-"""Passes over ground stations: how fast data comes down in them, and the parts of them to offer."""
+"""Passes over ground stations: their downlink rates, and the parts of them offered as contacts."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ Floats = npt.NDArray[np.float64]
 Longs = npt.NDArray[np.int64]
 
 _STEP_S: Final = 4.0
-"""Between instants of a rate: its integral is off by a thousandth at most, right overhead."""
+"""Between samples of a rate: its integral is off by at most a thousandth, in an overhead pass."""
 _PARTS: Final = (0.3, 0.6)
 _APART_S: Final = 2.0
-"""Between the starts of contacts, so that one in whole seconds tells which is meant."""
+"""Between the starts of contacts, so that a start in whole seconds identifies one."""
 _MS_PER_S: Final = 1000
 _CHUNK: Final = 16_384  # instants whose intermediate results fit the processor's cache
 
@@ -41,7 +41,7 @@ class Passes(NamedTuple):
     Attributes
     ----------
     rates
-        How fast data comes down in each, the station's gain included.
+        Downlink rate during each, the station's gain included.
     culmination_s
         When the satellite is highest, to a few seconds. Shape ``(num_passes,)``.
     """
@@ -79,16 +79,16 @@ def passes_of(
 
 
 class PlacedContacts(NamedTuple):
-    """The contacts of one satellite, with halves of passes that may not need any.
+    """The contacts of one satellite, including halves of passes that may not be needed.
 
     Attributes
     ----------
     placed
         Row of the pass, start and end in milliseconds. Shape ``(n,)`` each.
     is_half
-        Which contacts are. Shape ``(n,)``.
+        Which contacts are halves. Shape ``(n,)``.
     rates
-        How fast data comes down in each pass, where that had to be known.
+        Downlink rate during each pass; None if it was not needed.
     """
 
     passes: Accesses
@@ -107,9 +107,9 @@ def _place_parts(
 ) -> PlacedContacts:
     """Return the contacts that passes offer: each as a whole, and parts of it.
 
-    A part about the culmination takes down 30 or 60 % of the data, as much of what comes
-    before the culmination as of what comes after it. Halves take down as much each. The station's
-    setup goes before a part.
+    A part around the culmination downlinks 30 or 60 % of the data: the same share of what comes
+    before the culmination as of what comes after it. The two halves downlink equal amounts. Each
+    part begins with the station's setup.
     """
     row, start_ms, end_ms = place_contacts(accesses, stations)
     rows, starts_ms, ends_ms = [row], [start_ms], [end_ms]
@@ -145,10 +145,10 @@ def _part_s(passes: Passes, row: Longs, setup_s: Floats, share: float) -> tuple[
 
 
 def _halves_s(passes: Passes, row: Longs, setup_s: Floats) -> list[tuple[Floats, Floats]]:
-    """Return starts and ends of the halves of each of these passes, the setup before each.
+    """Return starts and ends of the halves of each of these passes, setup included.
 
-    The first begins a little after the pass: bookings name a contact by its start. A pass so short
-    that the second would begin with the first has none: there they are of no length.
+    The first begins a little after the pass, as bookings identify a contact by its start. A pass so
+    short that the second would begin with the first has no halves: they get zero length.
     """
     rates = passes.rates
     begin_s = rates.time_s[rates.first[row]] + _APART_S
@@ -166,9 +166,9 @@ def _halves_s(passes: Passes, row: Longs, setup_s: Floats) -> list[tuple[Floats,
 def with_halves_to_share(
     contacts: Sequence[PlacedContacts], stations: Sequence[GroundStation]
 ) -> list[Placed]:
-    """Return the contacts of all satellites, with halves where several want a pass.
+    """Return the contacts of all satellites, with halves only of passes that may be shared.
 
-    That is where more satellites pass a station at an instant than it has antennas.
+    Those are the ones during which a station sees more satellites at once than it has antennas.
     """
     wanted = [np.zeros(len(own.passes), dtype=np.bool_) for own in contacts]
     for site, station in enumerate(stations):
@@ -194,16 +194,16 @@ def with_halves_to_share(
 def contacts_of(
     scenario: Scenario, satellite: Satellite, path: Ephemeris, sites: Sites, found: Accesses
 ) -> PlacedContacts:
-    """Return the contacts of one satellite: in parts too, where part of a pass is worth more.
+    """Return the contacts of one satellite, with parts of passes if a part may be worth more.
 
-    That is where the rate follows the elevation; at stations with a setup time too, as a pass
-    that is cut short shares its setup among less data. Satellites that pass a station at the same
-    time can share its antenna in halves.
+    That is so if the rate depends on the elevation, and also at stations with a setup time, as a
+    shortened pass spreads its setup over less data. Halves let satellites that pass a station at
+    the same time share its antenna.
     """
     stations, resources = scenario.ground_stations, satellite.resources
     varies = bool(resources.downlink_by_elevation)
     has_parts = varies or any(station.setup_s > 0.0 for station in stations)
-    # Which passes are shared is known once all satellites are, and their paths are not kept.
+    # Shared passes are known only once all satellites are, and their paths are not kept until then.
     has_halves = len(scenario.satellites) > 1
     if not has_parts and not has_halves:
         placed = place_contacts(found, stations)
@@ -215,13 +215,13 @@ def contacts_of(
 def downlinks_of(
     scenario: Scenario, table: Opportunities, known: Sequence[PlacedContacts] = ()
 ) -> Downlinks:
-    """Return how fast each contact of the table takes data down.
+    """Return the downlink rates of the table's contacts.
 
     Parameters
     ----------
     known
-        The contacts of each satellite that the table was made of, where they are at hand. What
-        was worked out to place them is not worked out again.
+        The contacts of each satellite from which the table was made, if at hand. The rates that
+        were computed to place them are reused.
     """
     stations = scenario.ground_stations
     sites = Sites.of(stations)

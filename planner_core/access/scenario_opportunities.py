@@ -1,7 +1,7 @@
-"""The opportunities of a scenario: found by what geometry has to say, and stored.
+"""The opportunities of a scenario: computed from geometry, and stored.
 
-They depend on no solver, so that each scenario needs them once. What is stored is told from what
-other code has found by the sources it depends on (``planner_core.sources``).
+They depend on no solver, so each scenario needs them only once. Stored ones are told apart from
+those of other versions of the code by the sources they depend on (``planner_core.sources``).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from planner_core.problem import (
 Codes = npt.NDArray[np.int8]
 
 _NODES_KEPT: Final = 200_000
-"""Of paths, each of 144 bytes: those of 20 satellites over a week."""
+"""Of paths, 144 bytes each: as many as 20 satellites have over a week."""
 _SAMPLE: Final = 4096  # rows
 _WORTH_IT: Final = 0.8
 
@@ -63,12 +63,12 @@ _REASONS = np.array(
     ],
     dtype=np.int8,
 )  # fmt: skip
-"""From what is farthest from a collect to what is nearest."""
+"""From the farthest from having a collect to the nearest."""
 _RANK = {int(reason): rank for rank, reason in enumerate(_REASONS)}
 
 
 class KnownRates(NamedTuple):
-    """How fast the contacts of one scenario take data down. In another, stations may differ."""
+    """Downlink rates of the contacts of one scenario; in another, stations may differ."""
 
     scenario: Scenario
     downlinks: Downlinks
@@ -76,7 +76,7 @@ class KnownRates(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ScenarioOpportunities:
-    """All that geometry has to say about a scenario; computed once, stored, used by any solver.
+    """All that geometry determines about a scenario; computed once, stored, used by any solver.
 
     Attributes
     ----------
@@ -85,11 +85,11 @@ class ScenarioOpportunities:
     target_access
         Why a target has no collect, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     sunlight
-        One per satellite, whether its battery minds the shadow or not.
+        One per satellite, even if its battery model ignores eclipses.
     warnings
         Sentences for people.
     rates
-        How fast its contacts take data down, where that is at hand: it is not stored.
+        Downlink rates of its contacts, if at hand; they are not stored.
     """
 
     opportunities: Opportunities
@@ -99,7 +99,7 @@ class ScenarioOpportunities:
     rates: KnownRates | None = None
 
     def downlinks_of(self, scenario: Scenario) -> Downlinks:
-        """Return how fast contacts take data down in a scenario with these opportunities."""
+        """Return the contacts' downlink rates in a scenario with these opportunities."""
         if self.rates is not None and self.rates.scenario is scenario:
             return self.rates.downlinks
         return downlinks_of(scenario, self.opportunities)
@@ -118,11 +118,11 @@ class ScenarioOpportunities:
             "warnings": np.frombuffer(json.dumps(self.warnings).encode(), dtype=np.uint8),
         }
         buffer = io.BytesIO()
-        # As np.savez_compressed, in half the time: more effort hardly shrinks such numbers.
+        # Like np.savez_compressed, in half the time: higher levels hardly shrink such numbers.
         method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
         with zipfile.ZipFile(buffer, "w", method, compresslevel=1) as archive:
             for name, values in columns.items():
-                # A member with an entry of its own is stored as it is.
+                # A member given as a ZipInfo of its own is stored uncompressed.
                 file = f"{name}.npy" if _shrinks(values) else zipfile.ZipInfo(f"{name}.npy")
                 with archive.open(file, "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, values, allow_pickle=False)
@@ -149,23 +149,23 @@ class ScenarioOpportunities:
 
 
 def _shrinks(values: npt.NDArray[Any]) -> bool:
-    """Return whether it is worth the time to compress a column, by how its beginning shrinks.
+    """Return whether a column is worth the time to compress, judged by how its beginning shrinks.
 
-    Angles and lines of sight lose a tenth. They are two thirds of the table.
+    Angles and lines of sight, two thirds of the table, shrink by only a tenth.
     """
     sample = values[:_SAMPLE].tobytes()
     return len(zlib.compress(sample, 1)) < _WORTH_IT * len(sample)
 
 
 def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportunities:
-    """Return every opportunity of a scenario, worked out satellite by satellite.
+    """Return every opportunity of a scenario, computed satellite by satellite.
 
     Raises
     ------
     PropagationFailed
         SGP4 stops before the end of the horizon.
     InvalidScenario
-        There are too many.
+        ``too_many_opportunities`` or ``orbit_outside_span``.
     Cancelled
         The budget was spent first; there is no partial answer.
     """
@@ -175,7 +175,7 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
     contact = Limits.of_stations(scenario.ground_stations)
     paths = _Paths(scenario)
     contacts: list[PlacedContacts] = []
-    before_contacts: list[int] = []  # how many accesses there are, by satellite
+    before_contacts: list[int] = []  # number of accesses before each satellite's passes
     parts: list[tasks.Columns] = []
     lit: list[Sunlight] = []
     num_accesses = num_rows = 0
@@ -227,9 +227,9 @@ def compute_opportunities(scenario: Scenario, budget: Budget) -> ScenarioOpportu
 
 
 class _Paths:
-    """The paths of a scenario's satellites, each asked for twice.
+    """The paths of a scenario's satellites, each needed twice.
 
-    Those that are kept are not propagated again. A month of a constellation's would be a gigabyte.
+    At most ``_NODES_KEPT`` nodes are kept between: a constellation's month would be a gigabyte.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -256,7 +256,7 @@ def _sites(scenario: Scenario) -> dict[int, Sites]:
 
 
 def view_at(scenario: Scenario, table: Opportunities, rows: Longs, t_s: Floats) -> View:
-    """Return what some opportunities look like at other instants than their middle.
+    """Return the geometry of some opportunities at other instants than their middle.
 
     Parameters
     ----------
@@ -283,8 +283,8 @@ def view_at(scenario: Scenario, table: Opportunities, rows: Longs, t_s: Floats) 
 class _Collects:
     """Finds and places the collects of one satellite after another.
 
-    ``closeness`` tells, by target, how near any of them has come to one: an index of
-    ``_REASONS``.
+    ``closeness`` holds, for each target, how near any satellite has come to a collect of it, as an
+    index of ``_REASONS``.
     """
 
     def __init__(self, scenario: Scenario, sites: Sites):
@@ -297,7 +297,7 @@ class _Collects:
     def placed(
         self, sensor: Sensor, path: Ephemeris, budget: Budget
     ) -> tuple[Accesses, tasks.Placed]:
-        """Return the accesses of a satellite that count, and the collects in them."""
+        """Return a satellite's accesses within the targets' times, and the collects in them."""
         scenario, targets = self._scenario, self._scenario.targets
         served = self._eligibility.served_by(sensor)
         limits = Limits.of_targets(sensor, self._limits.at(served))
@@ -314,9 +314,9 @@ class _Collects:
         return in_time, placed
 
     def note_visible(self, sensor: Sensor, path: Ephemeris) -> None:
-        """Look for bare visibility, where it would bring a target nearer.
+        """Look for bare visibility of the targets that it would bring nearer to a collect.
 
-        Once all satellites are placed few targets are left to look for.
+        Once all collects are placed, few such targets are left.
         """
         is_served = np.zeros(len(self.closeness), dtype=np.bool_)
         is_served[self._eligibility.served_by(sensor)] = True

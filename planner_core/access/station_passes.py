@@ -20,7 +20,7 @@ from planner_core.orbits.sites import Sites, elevations_deg
 Floats = npt.NDArray[np.float64]
 
 _STEP_S: Final = 20.0
-"""Between the samples that find the highest rise of a window; an orbit takes 5,000 s and more."""
+"""Between the samples that find the highest peak of a window; an orbit takes 5,000 s or more."""
 _WITHIN_S: Final = 1e-4
 _GOLDEN: Final = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -75,7 +75,7 @@ def station_passes(
 
 
 def overlapping(passes: Sequence[StationPass]) -> list[list[int]]:
-    """Return for each pass the others that its station sees at the same time, by their place.
+    """Return for each pass the indices of others that its station sees at the same time.
 
     Passes that only touch do not overlap.
     """
@@ -115,8 +115,8 @@ def _with_culminations(
 def _culmination_s(path: Ephemeris, here: Sites, start_s: Floats, end_s: Floats) -> Floats:
     """Return when the satellite is highest in each window: samples, then a golden section.
 
-    Shape ``(n,)`` each. A window may hold several rises (a high orbit stays in sight for long), so
-    samples choose the rise, and the section its top.
+    Shape ``(n,)`` each. A window may have several peaks (a high orbit stays in sight for long), so
+    samples choose the peak, and the golden section refines it.
     """
     near_s = np.array(
         [
@@ -139,7 +139,7 @@ def _culmination_s(path: Ephemeris, here: Sites, start_s: Floats, end_s: Floats)
             np.where(rises, high_s, low_s + reach_s),
         )
     top_s = 0.5 * (low_s + high_s)
-    # A mask may cut the rise off: then the highest point is an end of the window.
+    # A mask may cut the peak off: then the highest point is an end of the window.
     candidates = np.stack([start_s, top_s, end_s])
     best = np.argmax(np.stack([height(each) for each in candidates]), axis=0)
     return np.asarray(candidates[best, np.arange(len(top_s))])

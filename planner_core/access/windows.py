@@ -1,10 +1,10 @@
-"""Accesses: when geometry lets one satellite see each of many places.
+"""Accesses: when geometry lets one satellite see each of many sites.
 
-The search takes the satellite's cubics minute by minute. A cap on the ground, rigorously
-large enough, leaves the few places that a minute can matter for; for those, every limit is a
-smooth function whose sign changes are found by value and rate at both ends (``orbits.crossings``)
-and swept together (``orbits.search``). Windows are rounded inward to the millisecond here,
-once, and nowhere else.
+The search goes through the satellite's cubics minute by minute. A cap on the ground, rigorously
+large enough, selects the few sites that may be seen in that minute. For those, every limit is a
+smooth function whose sign changes are found from its value and rate at both ends
+(``orbits.crossings``) and swept together (``orbits.search``). Windows are rounded inward to the
+millisecond here and nowhere else.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _ROUNDING_MS = 1e-5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Accesses:
-    """Windows of one satellite, ordered by place, then start. Shape ``(n,)`` each.
+    """Windows of one satellite, ordered by site, then start. Shape ``(n,)`` each.
 
     Attributes
     ----------
@@ -62,8 +62,8 @@ def find_accesses(
 ) -> Accesses:
     """Return all accesses of a satellite to each site over the horizon.
 
-    Complete for windows and gaps that a millisecond can show. When ``stop[0]`` becomes
-    non-zero the search ends early with the accesses found so far.
+    Complete for windows and gaps that a resolution of a millisecond shows. When ``stop[0]``
+    becomes non-zero, the search ends early with the accesses found so far.
     """
     coarse, fine = _caps(ephemeris, limits)
     site, windows = find_windows(
@@ -143,7 +143,7 @@ def _cap(ephemeris: Ephemeris, reach_rad: Floats, turn_rad_s: Floats, size: int)
     middle_s = np.asarray((first + last) * (0.5 * ephemeris.step_s), dtype=np.float64)
     middle, _ = ephemeris.state_itrf(middle_s)
     half_s = (last - first) * (0.5 * ephemeris.step_s)
-    # Along its path the satellite gets no farther from the middle than it can turn in half.
+    # The satellite gets no farther from the middle than it can turn in half the run.
     radius = reach_rad[nodes].max(axis=1) + turn_rad_s[nodes].max(axis=1) * half_s
     radius += _CAP_MARGIN_RAD
     centre = middle / np.linalg.norm(middle, axis=1)[:, None]
@@ -151,7 +151,7 @@ def _cap(ephemeris: Ephemeris, reach_rad: Floats, turn_rad_s: Floats, size: int)
 
 
 def _reach_rad(radius_m: Floats, limits: Limits) -> Floats:
-    """Return the Earth-central angle beyond which no place meets the limits. Shape ``(n,)``."""
+    """Return the Earth-central angle beyond which no site meets the limits. Shape ``(n,)``."""
     ratio = np.maximum(radius_m / _LOWEST_GROUND_M, 1.0)
     lowest = np.radians(limits.lowest_elevation_deg - _DEFLECTION_DEG)
     reach = np.arccos(np.cos(lowest) / ratio) - lowest
