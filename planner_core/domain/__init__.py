@@ -1,4 +1,4 @@
-"""The nouns of planning.
+"""The types that planning is about.
 
 Glossary
 --------
@@ -17,14 +17,14 @@ Epoch
 Reward, quality, worth
     What a perfect image of a target earns; how good an image is, from 0 to 1; their product.
 Objective
-    Which part of that an image earns when it is taken, and which when it is on the ground.
+    How much of its worth an image earns when it is taken, and how much when it is on the ground.
 Outage
-    A span in which a satellite or a station is not to be had.
+    A span in which a satellite or a station is unavailable.
 State
     What is known of a satellite's battery, recorder, attitude and images before the
     horizon begins.
 Pin
-    What a plan must hold, or must not; see ``planner_core.pins``.
+    What a plan must contain, or must not; see ``planner_core.pins``.
 Off-nadir angle
     At the satellite, between nadir and the line of sight. *Elevation* is measured at the ground.
 Slew, settle

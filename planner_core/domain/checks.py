@@ -1,4 +1,4 @@
-"""What types of the domain check of themselves when they are made."""
+"""Checks that the types of the domain make on themselves when they are created."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ class LightLimits(Protocol):
 
     @property
     def sun_elevation_min_deg(self) -> float | None:
-        """Return the lowest sun, as the target sees it."""
+        """Lowest elevation of the sun, as the target sees it."""
 
     @property
     def sun_elevation_max_deg(self) -> float | None:
-        """Return the highest sun."""
+        """Highest elevation of the sun."""
 
     @property
     def local_time_from_h(self) -> float | None:
-        """Return when the span of local solar time begins."""
+        """Start of the span of local solar time."""
 
     @property
     def local_time_to_h(self) -> float | None:
-        """Return when it ends."""
+        """End of the span of local solar time."""
 
 
 def require(condition: bool, where: str, message: str) -> None:
@@ -37,10 +37,10 @@ def require(condition: bool, where: str, message: str) -> None:
 
 
 def make_real(owner: object, *names: str) -> None:
-    """Make whole numbers of a frozen object real ones.
+    """Convert integers in these fields of a frozen object to floats.
 
-    They are of another type to a kernel and have it compiled anew. One that calls itself ends the
-    process when Numba loads it from disk in that form.
+    To a kernel they are another type, for which it is compiled anew. A recursive kernel compiled
+    for them crashes the process when Numba loads it from disk.
     """
     for name in names:
         value = getattr(owner, name)

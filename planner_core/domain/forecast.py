@@ -43,7 +43,7 @@ class SkySeries:
             values.flags.writeable = False
 
     def __eq__(self, other: object) -> bool:
-        """Whether both say the same."""
+        """Return whether both hold the same values."""
         return isinstance(other, SkySeries) and (
             np.array_equal(self.target, other.target)
             and np.array_equal(self.time_s, other.time_s)
@@ -55,14 +55,14 @@ class SkySeries:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forecast:
-    """Clear skies over the targets of a scenario.
+    """Probabilities of a clear sky over the targets of a scenario.
 
     Attributes
     ----------
     series
         No target is in two of them.
     default_clear_probability
-        Of targets and instants that no series covers. None where there are none.
+        For targets and instants that no series covers. None if there are none.
     """
 
     series: tuple[SkySeries, ...] = ()

@@ -28,7 +28,7 @@ class Horizon:
 
     @property
     def duration_s(self) -> float:
-        """Return the length of the horizon."""
+        """Length of the horizon in seconds."""
         return (self.end - self.start).total_seconds()
 
     def instant(self, offset_s: float) -> datetime:

@@ -1,4 +1,4 @@
-"""What a plan is to earn: images taken, images on the ground, and how soon."""
+"""What a plan should earn: images taken, images on the ground, and how soon."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Literal, Self, get_args
 from planner_core.domain.checks import require
 
 Preference = Literal["early", "off_nadir", "sun", "balance", "margin", "few_contacts"]
-"""A secondary aim: least mean age, least mean angle off nadir, highest mean sun elevation, least
-share of the busiest satellite, highest lowest battery, fewest contacts."""
+"""A secondary aim: least mean age, least mean off-nadir angle, highest mean sun elevation, least
+share of the busiest satellite, highest minimum battery level, fewest contacts."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Objective:
-    """Which part of its worth an image earns when, see ``planner_core.worth``.
+    """How much of its worth an image earns at which time; see ``planner_core.worth``.
 
     Attributes
     ----------
@@ -23,10 +23,10 @@ class Objective:
         The part that an image earns when it is taken, 0 to 1. The rest it earns when its last bit
         is on the ground, first in, first out.
     half_life_s
-        The rest halves with every such time between the end of the collect and that instant; None
+        The rest halves with every half-life between the end of the collect and that instant; None
         for no decay.
     prefer
-        Secondary aims, in order: of plans of the same worth, which are liked better.
+        Secondary aims, in order, which decide between plans of the same worth.
     """
 
     collected_share: float = 1.0
@@ -54,15 +54,15 @@ class Objective:
 
     @classmethod
     def delivered(cls) -> Self:
-        """Return the objective of images on the ground: before that they earn nothing."""
+        """Return the objective under which images earn nothing until they are on the ground."""
         return cls(collected_share=0.0)
 
     @property
     def counts_delivery(self) -> bool:
-        """Whether it matters what becomes of an image after it was taken."""
+        """Whether it matters what becomes of an image after it is taken."""
         return self.collected_share < 1.0
 
     @property
     def is_delivered(self) -> bool:
-        """Whether an image is worth all on the ground by the end, and nothing on board."""
+        """Whether an image earns all on the ground, however late, and nothing on board."""
         return self.collected_share == 0.0 and self.half_life_s is None

@@ -16,7 +16,7 @@ Interpolation = Literal["LAGRANGE", "HERMITE"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class EphemerisSegment:
-    """States between which one polynomial rule holds.
+    """States between which one interpolation rule holds.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class EphemerisSegment:
     t_s
         Seconds since ``first``, ascending. Shape ``(n,)``.
     position_km, velocity_km_s
-        In ``frame``; Earth-fixed velocities are relative to the turning Earth. Shape ``(n, 3)``.
+        In ``frame``; Earth-fixed velocities are relative to the rotating Earth. Shape ``(n, 3)``.
     """
 
     frame: Frame
@@ -64,10 +64,10 @@ class OrbitEphemeris:
 
     @property
     def norad_cat_id(self) -> int:
-        """Return 0: messages of this kind have no catalogue number."""
+        """Always 0: messages of this kind have no catalogue number."""
         return 0
 
     @property
     def epoch(self) -> datetime:
-        """Return the first instant at which the states may be used."""
+        """First instant at which the states may be used."""
         return self.segments[0].start

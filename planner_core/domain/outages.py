@@ -1,4 +1,4 @@
-"""Spans in which a satellite or a ground station is not to be had."""
+"""Spans in which a satellite or a ground station is unavailable."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner_core.pins import PinnedMode
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outage:
-    """A fact that planning has to live with: a safe mode, a station that is down.
+    """A fact that planning has to accept: a safe mode, a station that is down.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class Outage:
     start, end
         No task of these modes overlaps this span.
     modes
-        What a satellite cannot do meanwhile. A station's are contacts, whatever is said.
+        What a satellite cannot do meanwhile. Ignored for a station, which can have no contacts.
     reason
         For people.
     """

@@ -33,7 +33,7 @@ class Quality:
         _check_curve("sun_elevation_deg", self.sun_elevation_deg, -90.0, 90.0)
 
     def __bool__(self) -> bool:
-        """Whether it makes any difference between images."""
+        """Return whether it makes any difference between images."""
         return bool(self.off_nadir_deg or self.sun_elevation_deg)
 
 

@@ -1,4 +1,4 @@
-"""What a plan that follows another one has to respect: what is flown, and what is promised."""
+"""What a replan has to respect: what is flown already, and what is promised."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Elements = Literal["same", "newest"]
 Outcome = Literal["executed", "failed", "skipped", "partial"]
 
 _NEARLY_S: Final = 1.0  # bookings are made in whole seconds
-_SAME_PASS_S: Final = 1200.0  # the next access of a place is an orbit away
+_SAME_PASS_S: Final = 1200.0  # the next access to a site is an orbit away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +26,7 @@ class Promise:
     Attributes
     ----------
     image_by, deliver_by
-        When the image must have ended, and when it must be on the ground, where that matters.
+        Latest end of the collect, and latest delivery of the image to the ground; None for any.
     """
 
     target_id: str
@@ -36,15 +36,15 @@ class Promise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stability:
-    """How dear it is to leave an action of the plan before.
+    """How costly it is to depart from an action of the previous plan.
 
     Attributes
     ----------
     weight, contact_weight
-        What keeping a collect, or a contact, counts in the search: shares of a typical reward.
+        What keeping a collect, or a contact, is worth in the search: shares of a typical reward.
     max_changed_share
-        Of the actions after the freeze, the most that may be moved or removed; None for any.
-        What is lost anyway counts too, and cannot be helped.
+        Largest share of the actions after the freeze that may be moved or removed; None for any.
+        Actions that are lost in any case count too, and may exceed it.
     """
 
     weight: float = 0.03
@@ -64,9 +64,9 @@ class Flown:
     Attributes
     ----------
     outcome
-        ``failed`` draws its energy, and holds no data but ``mbit``; ``skipped`` does nothing.
+        ``failed`` draws its energy, but moves no data except ``mbit``; ``skipped`` does nothing.
     mbit
-        What was taken or brought down. None for what was planned, of what failed nothing.
+        Data taken or downlinked. None for as much as planned, or for nothing if it failed.
     """
 
     satellite_id: str
@@ -79,31 +79,31 @@ class Flown:
 
     @property
     def is_imaged(self) -> bool:
-        """Whether its target has an image by it."""
+        """Whether its target is imaged by it."""
         return self.target_id is not None and self.outcome in ("executed", "partial")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replan:
-    """A plan to go on from.
+    """The previous plan, from which planning goes on.
 
     Attributes
     ----------
     base
-        The actions of the plan before, less what failed; each named by satellite, place and start.
+        The actions of the previous plan, except failed ones; named by satellite, site and start.
     freeze_until
-        What starts before it is flown, or as good as: it stays, and nothing is added to it.
+        Actions that start before it are flown, or as good as flown: they stay, and none is added.
     promises
         Targets that must be imaged.
     elements
-        Of which elements the plan before was: of ``newest`` ones what is frozen stays at its
-        instants, and what comes later is the opportunity that starts nearest to it.
+        Whether elements are those of the previous plan. With ``newest`` ones, frozen actions keep
+        their instants, and each later one becomes the opportunity that starts nearest to it.
     flown
-        What began before the horizon. States are carried to its start by these actions. The last
-        one of a satellite before its state says where that looked, if nothing else does.
+        Actions that began before the horizon, by which states are carried to its start. A
+        satellite's last one before its state says where that looked, if nothing else does.
     before
-        Older states, where newer ones do not say what is on board: that follows from these and
-        from what was flown since, and the newer ones correct how much it is.
+        Older states, for satellites whose newer ones do not say what is on board: that follows from
+        these and from what was flown since, and the newer ones correct how much it is.
     """
 
     base: tuple[PinnedAction, ...]
@@ -116,7 +116,7 @@ class Replan:
 
     @property
     def near_s(self) -> float:
-        """How far from an action of the base the same opportunity may start now."""
+        """Seconds by which an opportunity may start before or after its action of the base."""
         return _SAME_PASS_S if self.elements == "newest" else _NEARLY_S
 
     def check(
@@ -125,7 +125,7 @@ class Replan:
         target_ids: Collection[str],
         station_ids: Collection[str],
     ) -> None:
-        """Check that the scenario holds what is named.
+        """Check that the scenario holds all that is named.
 
         Raises
         ------

@@ -27,28 +27,28 @@ CollectAlignment = Literal["access", "horizon"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """The frozen question: who may image what, when, and under which rules.
+    """The question, immutable: who may image what, when, and under which rules.
 
     Attributes
     ----------
     collect_alignment
-        Whether the starts of ``collect_spacing_s`` count from each access, or are multiples of it
-        from the horizon's start.
+        Whether starts are ``collect_spacing_s`` apart from each access's start on, or are multiples
+        of it from the horizon's start.
     quality
-        What part of its target's reward an image earns, by how it is taken.
+        The share of its target's reward that an image earns, by how it is taken.
     forecast
-        How likely the sky over each target is clear. None to take it for clear.
+        How likely the sky over each target is clear. None to assume a clear sky.
     objective
-        What of that it earns when it is taken, and what when it is on the ground. Without
+        How much of that it earns when it is taken, and how much when it is on the ground. Without
         resources there are no contacts, and images earn all when they are taken.
     allow_old_elements
         Plan with element sets of any age (see ``orbits.checks.check_element_age``).
     outages
-        What is known to be out, and when.
+        Which satellites and stations are known to be unavailable, and when.
     states
-        What satellites had before the horizon began, where that is known: at most one of each.
+        Known states of satellites before the horizon begins: at most one of each.
     replan
-        The plan to go on from, where there is one.
+        The plan to go on from, if there is one.
     """
 
     horizon: Horizon
@@ -73,7 +73,7 @@ class Scenario:
     def __post_init__(self) -> None:
         require(len(self.satellites) > 0, "satellites", "at least one is needed")
         self._check_starts()
-        # The authors' events forgo or charge whole spans: there is no time to turn in them.
+        # The authors' events charge for a whole span or not at all: they have no time for a slew.
         require(
             not self.use_resources
             or self.dynamics == "physical"
@@ -110,13 +110,13 @@ class Scenario:
     def has_continuous_starts(self) -> bool:
         """Whether collects may start anywhere in their accesses.
 
-        The events of ``dynamics: paper`` are the starts of opportunities: it knows no others.
+        The events of ``dynamics: paper`` are the starts of opportunities; there are no others.
         """
         knows_starts_alone = self.use_resources and self.dynamics == "paper"
         return self.continuous_starts and not knows_starts_alone
 
     def _check_starts(self) -> None:
-        """Refuse starts of collects that other fields say nothing of."""
+        """Refuse options for the starts of collects that other fields do not allow."""
         require(
             self.collect_spacing_s is None or self.collect_spacing_s > 0,
             "collect_spacing_s",
@@ -128,13 +128,13 @@ class Scenario:
             "collect_alignment",
             "horizon needs a collect_spacing_s, and no continuous_starts",
         )
-        # Plans with free starts are proven best where earlier is never worse.
+        # Proofs for continuous starts assume that starting earlier is never worse.
         require(
             not (self.quality and self.continuous_starts),
             "continuous_starts",
             "an image's quality would change with its start: use collect_spacing_s with quality",
         )
-        # A start before its opportunity's would earn more than the bound knows of.
+        # A start before its opportunity's would earn more than the bound assumes.
         require(
             not (self.continuous_starts and any(t.reward_half_life_s for t in self.targets)),
             "continuous_starts",
@@ -165,8 +165,8 @@ class Scenario:
     def _check_downlinks(self) -> None:
         """Refuse passes in which telemetry may fill the recorder faster than it is emptied.
 
-        Where data begins to flow the recorder must not fill again until the contact's end, so
-        that one number tells what it takes down.
+        Once data begins to flow, the recorder must not fill again until the contact's end, so that
+        one number describes what the contact downlinks.
         """
         for index, satellite in enumerate(self.satellites):
             resources = satellite.resources
@@ -186,12 +186,12 @@ class Scenario:
 
 
 def check_coverage(forecast: Forecast, horizon: Horizon, targets: Sequence[Target]) -> None:
-    """Refuse a forecast that has nothing to say of a time at which a target may be imaged.
+    """Refuse a forecast that does not cover a time at which a target may be imaged.
 
     Raises
     ------
     InvalidScenario
-        ``forecast_does_not_cover``, with the first target and the first instant of it.
+        ``forecast_does_not_cover``, with the first such target and its first such instant.
     """
     if forecast.default_clear_probability is not None:
         return

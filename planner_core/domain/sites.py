@@ -1,4 +1,4 @@
-"""Sites on the ground: what is to be imaged, and what takes data down."""
+"""Sites on the ground: targets to be imaged, and stations that receive data."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from planner_core.domain.spacecraft import LookSide, OrbitDirection
 class Target:
     """A point on the ground to be imaged once, by any satellite.
 
-    The limits from ``off_nadir_min_deg`` to ``orbit_direction`` are named and meant as those of
-    ``Sensor``, and narrow them: a collect meets both.
+    The limits from ``off_nadir_min_deg`` to ``orbit_direction`` have the names and meanings of
+    those of ``Sensor``, and narrow them: a collect meets both.
 
     Attributes
     ----------
     name
-        For people. None where only the id tells targets apart.
+        For people. None if there is only the id.
     release, due
         Aware instants between which a collect lies as a whole. None for no limit.
     sensor_type
-        Only satellites whose sensor has this very type may collect it. None for any satellite.
+        Only satellites whose sensor has this type may collect it. None for any satellite.
     reward_half_life_s
-        The reward halves with every such time from ``release``, or the horizon's start, to the
-        start of the collect. None where it does not fall.
+        The reward halves with every half-life from ``release``, or else the horizon's start, to the
+        start of the collect. None if it does not fall.
     """
 
     id: str
@@ -80,7 +80,7 @@ class Target:
 
     @property
     def title(self) -> str:
-        """What people call it: its name where it has one, and its id.
+        """What people call it: its name, if it has one, and its id.
 
         >>> Target(id="7", name="Bern", lat_deg=46.9, lon_deg=7.4).title
         'Bern (7)'
@@ -93,14 +93,14 @@ class GroundStation:
     """A ground station that serves ``antennas`` satellites at a time.
 
     ``elevation_mask`` is a tuple of (azimuth_deg, elevation_deg) knots, linear between
-    them and round the compass; the higher of mask and ``min_elevation_deg`` holds.
+    them and round the compass; the higher of mask and ``min_elevation_deg`` applies.
 
     Attributes
     ----------
     setup_s
-        At the beginning of each contact, in which nothing comes down.
+        Time at the beginning of each contact in which nothing is downlinked.
     downlink_gain
-        Factor on the downlink's rate of each satellite.
+        Factor on each satellite's downlink rate.
     """
 
     id: str

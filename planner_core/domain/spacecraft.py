@@ -55,7 +55,7 @@ class OrbitElements:
 
     @property
     def period_s(self) -> float:
-        """Return the mean (Kozai) orbital period."""
+        """Mean (Kozai) orbital period."""
         return 86400.0 / self.mean_motion_rev_day
 
 
@@ -63,7 +63,7 @@ Orbit = OrbitElements | OrbitEphemeris
 
 
 def mean_elements(orbit: Orbit) -> OrbitElements:
-    """Return an orbit that is given by elements; `TypeError` where it is an ephemeris."""
+    """Return an orbit that is given by elements; raise `TypeError` for an ephemeris."""
     if isinstance(orbit, OrbitElements):
         return orbit
     raise TypeError(f"The orbit of {orbit.name!r} is an ephemeris.")
@@ -71,15 +71,15 @@ def mean_elements(orbit: Orbit) -> OrbitElements:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Agility:
-    """How fast the satellite turns. Defaults are the paper's 1 deg/s at once.
+    """How fast the satellite slews. Defaults are the paper's: 1 deg/s, reached at once.
 
     Attributes
     ----------
     slew_model
         From rest to rest, or from the moving line of sight of one task to that of another.
     sun_exclusion_deg
-        Least angle between boresight and sun in turns; None for no limit. Plans do not look at it:
-        a flight does.
+        Least angle between boresight and sun during slews; None for no limit. Planning ignores it;
+        the flight simulation of the benchmarks checks it.
     """
 
     slew_rate_deg_s: float = 1.0
@@ -107,7 +107,7 @@ class Agility:
 
     @property
     def tracks(self) -> bool:
-        """Whether turns begin and end with the rates of tracking."""
+        """Whether slews begin and end at the rates of moving lines of sight."""
         return self.slew_model == "moving"
 
 
@@ -133,7 +133,7 @@ class Sensor:
     orbit_direction
         Ascending while the satellite moves north.
     sensor_type
-        What targets may ask for by this name; None serves only targets that ask for none.
+        A name by which targets may ask for it; None serves only targets that ask for no type.
     sun_exclusion_deg
         Least angle between the line of sight and the sun. None for no limit.
     """
@@ -167,7 +167,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resources:
-    """Battery and recorder in fractions of their capacity, per second.
+    """Battery and recorder: levels as fractions of capacity, and rates of them per second.
 
     All rates are magnitudes: the model knows which of them charge and which drain.
 
@@ -178,17 +178,17 @@ class Resources:
     collect_drain_per_s, contact_drain_per_s
         Net draw of the two modes.
     collect_fill_per_s, downlink_per_s, telemetry_per_s
-        What a collect writes, a contact takes down, and telemetry adds at all times.
+        What a collect writes, a contact downlinks, and telemetry adds at all times.
     downlink_by_elevation
-        Knots of a station's elevation in degrees and the downlink's rate per second there, linear
-        between and constant beyond; ``downlink_per_s`` where there are none.
+        Knots of elevation at the station in degrees and downlink rate per second, linear between
+        and constant beyond; ``downlink_per_s`` applies if there are none.
     recorder_capacity_mbit
-        Size of the recorder, or None where only fractions are known (the presets).
+        Size of the recorder, or None if only fractions are known (the presets).
     sun_pointing
         Whether all idle time counts as pointing at the sun (``free``), or only what is left
-        between a turn to the sun and one back (``slew``).
+        between a slew to the sun and one back (``slew``).
     panel_angle_deg
-        Between the normal of the panels and the boresight; the rotation about it is free.
+        Between the normal of the panels and the boresight, about which rotation is free.
     idle_drain_per_s
         Drawn at all times, in shadow too; the modes' rates come on top of it.
     """
@@ -211,7 +211,7 @@ class Resources:
     downlink_by_elevation: tuple[tuple[float, float], ...] = ()
 
     def downlink_at(self, elevation_deg: Floats) -> Floats:
-        """Return the downlink's rate per second by the elevation at a station of gain 1."""
+        """Return the downlink rate per second at each elevation, for a station of gain 1."""
         if not self.downlink_by_elevation:
             return np.full_like(elevation_deg, self.downlink_per_s)
         knots = np.array(self.downlink_by_elevation, dtype=np.float64)
@@ -224,7 +224,7 @@ class Resources:
 
     @classmethod
     def limitless(cls) -> Resources:
-        """Return what nothing draws on or fills, so that agility alone counts."""
+        """Return resources that nothing draws on or fills, so that agility alone counts."""
         return cls(
             battery_min_fraction=0.0,
             initial_battery_fraction=1.0,
@@ -299,7 +299,7 @@ class Satellite:
     Attributes
     ----------
     spacecraft
-        The type that its figures are from, where one is known.
+        The type that its figures are from, if known.
     """
 
     id: str

@@ -13,7 +13,7 @@ from planner_core.domain.spacecraft import Satellite
 from planner_core.errors import InvalidScenario
 
 OLDEST_STATE: Final = timedelta(days=7)
-"""Before the horizon; idling for longer says nothing of where a satellite is."""
+"""Before the horizon; from an older state, idling does not predict what a satellite has."""
 
 _ROUNDING: Final = 1e-6  # of a recorder
 _UNIT: Final = 1e-3  # how far from 1 the length of a unit vector may be
@@ -21,18 +21,18 @@ _UNIT: Final = 1e-3  # how far from 1 the length of a unit vector may be
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attitude:
-    """Where a satellite looks: exactly one of these.
+    """Where a satellite looks: exactly one of these is set.
 
     Attributes
     ----------
     opportunity_id
-        Of the scenario: it tracks the target or the station of that one.
+        An opportunity of the scenario, whose target or station it tracks.
     target_id, station_id
-        It tracks that place.
+        The target or station that it tracks.
     line_of_sight
         A unit vector in the inertial (TEME) frame; the satellite is at rest.
     at_sun
-        Its panels are at the sun.
+        Whether its panels face the sun.
     """
 
     opportunity_id: str | None = None
@@ -86,9 +86,9 @@ class OnBoard:
         When its collect ended.
     mbit, recorder_fraction
         How much of it is left, in megabits or as a fraction of the recorder: exactly one of the
-        two. 0 for an image that is on the ground already: its target needs no other.
+        two is set. 0 for an image that is on the ground already: its target needs no other.
     worth
-        Of the image, whole. None for its target's reward.
+        Of the whole image. None for its target's reward.
     """
 
     target_id: str
@@ -140,19 +140,19 @@ class OnBoard:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State:
-    """What telemetry says of a satellite at an instant; until the horizon it idles.
+    """What telemetry says of a satellite at an instant, from which it idles until the horizon.
 
     Attributes
     ----------
     at
-        At most the horizon's start.
+        No later than the horizon's start.
     battery_fraction, recorder_fraction
-        Of capacity. None for what the satellite's ``resources`` say of the horizon's start.
+        Of capacity. None for the levels that the satellite's ``resources`` give for the start.
     attitude
-        Where it looks. None where that is not known: then the first task needs no turn.
+        Where it looks. None if unknown: then the first task needs no slew.
     on_board
-        Images that come down first, in this order, and then what else the recorder holds. None
-        where that is not known.
+        Images on board, which are downlinked first, in this order, before anything else that the
+        recorder holds. None if unknown.
     """
 
     satellite_id: str
@@ -163,7 +163,7 @@ class State:
     on_board: tuple[OnBoard, ...] | None = None
 
     def recorder(self, capacity_mbit: float | None) -> float | None:
-        """Return what the recorder holds: what the images come to where that is all we know."""
+        """Return the recorder's level, or the sum of its images if only those are known."""
         if self.recorder_fraction is not None or not self.on_board:
             return self.recorder_fraction
         return min(1.0, math.fsum(image.amount(capacity_mbit) for image in self.on_board))

@@ -1,4 +1,4 @@
-"""Cells of a degree that hold some land, for a first look at catalogues of targets."""
+"""One-degree cells that contain land, for a first look at catalogues of targets."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Cells = npt.NDArray[np.bool_]
 
 
 def may_be_land(lat_deg: npt.ArrayLike, lon_deg: npt.ArrayLike) -> Cells:
-    """Return which places share a cell of a degree with land, or are within a fifth of one.
+    """Return which points lie in a one-degree cell that contains land or is within 0.2 deg of it.
 
-    Land is that of Natural Earth's outlines at 1:110m: islands of some kilometres are missing.
+    Land is that of Natural Earth's outlines at 1:110m, which lack islands of a few kilometres.
 
     >>> may_be_land([46.9, 0.0], [7.4, -30.0]).tolist()
     [True, False]

@@ -1,6 +1,6 @@
-"""Write the cells that hold land, from the outlines of the dashboard's map.
+"""Write the cells that contain land, from the outlines of the dashboard's map.
 
-To make the file again, after those outlines::
+To make the file again once those outlines have changed::
 
     python -m planner_core.geography.make_land_cells service/dashboard/static/land.json
 """
@@ -22,12 +22,12 @@ _NEAR_DEG: Final = 0.2
 
 
 def cells_of(rings: list[list[float]]) -> Cells:
-    """Return which cells of a degree have land in them or near. Shape ``(180, 360)``.
+    """Return which one-degree cells contain land or are near it. Shape ``(180, 360)``.
 
     Parameters
     ----------
     rings
-        Longitude and latitude in turn, in degrees. Lakes count as land.
+        Alternating longitude and latitude, in degrees. Lakes count as land.
     """
     outlines = [shapely.Polygon(np.reshape(ring, (-1, 2))).buffer(_NEAR_DEG) for ring in rings]
     tree = shapely.STRtree(outlines)
@@ -40,7 +40,7 @@ def cells_of(rings: list[list[float]]) -> Cells:
 
 
 def main(outlines: Path) -> None:
-    """Write the file, a row for each degree of latitude from the south, the west first."""
+    """Write the file: a row for each degree of latitude from the south, its cells from the west."""
     cells = cells_of(json.loads(outlines.read_text(encoding="utf-8"))["rings"])
     packed = np.packbits(cells, axis=1)
     with Path(__file__).with_name(FILE).open("w", encoding="utf-8", newline="") as file:
