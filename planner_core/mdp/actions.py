@@ -31,10 +31,10 @@ def next_action(
     """Return the first row from ``from_row`` on that may be taken after ``last``, or ``m``.
 
     With ``is_hard`` an action must also keep the limits, now and (see ``is_safe``) to the end of
-    the horizon. Contacts that may as well pass (see ``contact_may_pass``) are left out. A(s) ends
-    with the next task that must be taken, and what that one could not follow is not in it.
+    the horizon. Contacts that may be skipped (see ``contact_may_pass``) are left out. A(s) ends
+    with the next task that must be taken, and leaves out tasks that this one could not follow.
     """
-    # Rows that start before the last task ends need no look.
+    # Rows that start before the last task ends need not be examined.
     first = from_row if last < 0 else max(from_row, track.near_from[last])
     m = len(track.start_s)
     kept = track.next_kept[last + 1]
@@ -60,7 +60,7 @@ def next_action(
             continue
         if row != kept and contact_may_pass(track, last, row, battery, recorder, contact_above):
             continue
-        # Without a way to keep the limits, what must be taken comes before them.
+        # If there is no way to keep the limits, tasks that must be taken override them.
         if track.use_resources and is_hard and (row != kept or track.is_guarded):
             battery_after, recorder_after, is_within = take(
                 track.resources, last, row, battery, recorder
@@ -78,7 +78,7 @@ def contact_may_pass(
 ) -> bool:
     """Return whether ``row`` is a contact that is not worth its power and time yet.
 
-    That is while the recorder is less full than ``contact_above`` and has room for what is
+    That is so while the recorder is less full than ``contact_above`` and has room for what will be
     written until the next contact, and the limits can be kept without this one.
     """
     if not (track.use_resources and track.is_contact[row] and recorder < contact_above):
@@ -94,8 +94,8 @@ def first_affordable(
 ) -> int:
     """Return a row from ``first`` on before which every collect breaks a limit; at most ``end``.
 
-    Until then a search need look at contacts alone. Where the battery is what limits, that
-    leaves out most of the rows of accesses that offer many starts.
+    Before that row a search need examine contacts only. If the battery is the limit, that skips
+    most of the rows of accesses that offer many starts.
     """
     # Idle time never empties the recorder.
     resources = track.resources
@@ -112,7 +112,7 @@ def first_affordable(
 def _is_charged(
     charge_s: float, charge_per_s: float, battery: float, cost: float, least: float
 ) -> bool:
-    """Return whether the battery can pay where idle time draws nothing, as ``take`` has it."""
+    """Return whether the battery can pay ``cost``, computed as in ``take`` without idle draw."""
     return min(1.0, battery + charge_per_s * max(0.0, charge_s)) - cost > least
 
 
@@ -129,9 +129,9 @@ def _first_charged(
 ) -> int:
     """Return a row before which the battery cannot pay ``cost``, or ``end``.
 
-    That is the first row at whose start it can, where idle time draws nothing and the sun needs
-    no turn; otherwise it can be one before. ``charge_top_s`` only grows with time, so that steps
-    that double find a row beyond it, and halving what lies between finds it.
+    If idle time draws nothing and the sun needs no slew, it is the first row at whose start the
+    battery can pay; otherwise it may be an earlier one. As ``charge_top_s`` never falls, steps of
+    doubling length find a row beyond it, and bisection then finds it.
     """
     before, beyond, stride = first - 1, first, 1
     while beyond < end and not _is_charged(
@@ -149,10 +149,10 @@ def _first_charged(
 
 @inlined
 def is_repeated(track: Track, chosen: Ints, begin: int, end: int, row: int) -> bool:
-    """Return whether ``chosen[begin:end]``, in time order, has an earlier collect of its access.
+    """Return whether ``chosen[begin:end]``, in time order, has an earlier collect of this access.
 
-    A(s) holds the first feasible collect of each access: the later ones would push other
-    targets out of its ``breadth``, and are on offer again after the next action.
+    A(s) holds only the first feasible collect of each access: later ones would push other targets
+    out of its ``breadth``, and are offered again after the next action.
     """
     first = track.first_offer[row]
     at = end - 1

@@ -1,17 +1,17 @@
-r"""What idle time does to a battery, as one number for each task.
+r"""The effect of idle time on a battery, as a few numbers for each task.
 
 Let :math:`N(t) = c\,S(t) - p\,t` be what a satellite gains that is always at the sun, with the
-charge :math:`c`, the sunlit seconds :math:`S` so far and the idle draw :math:`p`. Task ``i``
-reaches the sun at :math:`a_i`, its end and its turn; task ``j`` leaves it at :math:`d_j`, its
-start less its turn. Between the two the battery gains :math:`c \max(0, S(d_j) - S(a_i))` and loses
-:math:`p` all the time. Where :math:`p > 0` a battery may be full, or lowest, in the middle of an
-idle span, and still no pair of tasks needs looking at:
+charging rate :math:`c`, the sunlit seconds :math:`S` so far and the idle draw :math:`p`. After task
+``i`` the sun is reached at :math:`a_i`, the task's end plus a slew; for task ``j`` it is left at
+:math:`d_j`, the task's start minus a slew. In between the battery gains
+:math:`c \max(0, S(d_j) - S(a_i))`, and it loses :math:`p` at all times. If :math:`p > 0`, it may be
+full, or lowest, in the middle of an idle span; even so, no pair of tasks need be examined:
 
 * at the start of ``j`` it holds :math:`1 + \min_{t \le d_j}(N(d_j) - N(t)) - p\,(s_j - d_j)` at
-  most: it was at most full at every instant before, and nobody gains more than :math:`N`;
-* after ``i`` it must hold more than its least by
-  :math:`p\,(a_i - e_i) + \max_{t \ge a_i}(N(a_i) - N(t))`: whatever comes then has less at each
-  such instant than the satellite that stays at the sun.
+  most: it was at most full at every instant before, and no satellite gains more than :math:`N`;
+* after ``i`` it must exceed its minimum by
+  :math:`p\,(a_i - e_i) + \max_{t \ge a_i}(N(a_i) - N(t))`: whatever follows, it has less at each
+  such instant than if the satellite stayed at the sun.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from planner_core.problem import Floats, SatelliteProblem
 
 
 class IdleEnergy(NamedTuple):
-    """By task; shape ``(m,)`` unless said otherwise.
+    """Values for each task; shape ``(m,)`` unless said otherwise.
 
     Attributes
     ----------
     sun_from_s, sun_until_s
         Sunlit seconds at the instant the sun is reached after a task, and left before it.
     full
-        The most that the battery can hold at the start.
+        The most that the battery can hold at the task's start.
     reserve, least_reserve
-        How far above its minimum it must be at the end; and at least so, whatever order tasks
-        reach the sun in.
+        How far above its minimum it must be at the task's end; and a lower bound of that, which
+        holds even if a later task reaches the sun sooner.
     reserve_start
-        The same at the start of the horizon. A number.
+        The reserve at the start of the horizon. A number.
     """
 
     sun_from_s: Floats
@@ -48,7 +48,7 @@ class IdleEnergy(NamedTuple):
 
 
 def idle_energy(satellite: SatelliteProblem, horizon_s: float) -> IdleEnergy:
-    """Return what idle time does to a satellite's battery (``dynamics: physical``)."""
+    """Return the effect of idle time on a satellite's battery (``dynamics: physical``)."""
     start_s, end_s = satellite.start_s, satellite.end_s
     arrive_s = end_s + satellite.turns.out_s
     depart_s = np.maximum(start_s - satellite.turns.back_s, 0.0)
@@ -58,7 +58,7 @@ def idle_energy(satellite: SatelliteProblem, horizon_s: float) -> IdleEnergy:
     if drain == 0.0:
         return IdleEnergy(sunlit(arrive_s), sunlit(depart_s), none + 1.0, none, none, 0.0)
     gains = _Gains(satellite, horizon_s)
-    # A later task may reach the sun sooner, where lines of sight turn towards it.
+    # A later task may reach the sun sooner if its line of sight needs a shorter slew to it.
     soonest_s = np.minimum.accumulate(arrive_s[::-1])[::-1]
     return IdleEnergy(
         sun_from_s=sunlit(arrive_s),
@@ -71,7 +71,7 @@ def idle_energy(satellite: SatelliteProblem, horizon_s: float) -> IdleEnergy:
 
 
 class _Gains:
-    """N of the module's docstring, and its extremes up to an instant and from one on."""
+    """N of the module's docstring, with its maximum up to an instant and minimum from one on."""
 
     def __init__(self, satellite: SatelliteProblem, horizon_s: float) -> None:
         self._charge = satellite.resources.sunpoint_charge_per_s
@@ -89,13 +89,13 @@ class _Gains:
         return self._charge * self._sunlit(t_s) - self._drain * t_s
 
     def fall_until(self, t_s: Floats) -> Floats:
-        """Return how far each instant's gain is below the highest one until then."""
+        """Return how far N at each instant is below its maximum until then."""
         gain = self._at(t_s)
         before = np.searchsorted(self._corner_s, t_s, side="right") - 1
         return np.maximum(self._highest_until[before] - gain, 0.0)
 
     def reserve(self, end_s: Floats, sun_from_s: Floats) -> Floats:
-        """Return what a battery loses at most after ``end_s``, at the sun from later on."""
+        """Return the most a battery loses after ``end_s`` if at the sun from ``sun_from_s`` on."""
         at_s = np.minimum(sun_from_s, self._horizon_s)
         gain = self._at(at_s)
         after = np.searchsorted(self._corner_s, at_s, side="left")

@@ -16,16 +16,16 @@ from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bytes, Floats
 
 WAIT: Final = -1
-"""The sun-point action: wait for the first opportunity one could take, and let it pass."""
+"""The sun-point action: wait for the first opportunity that could be taken, and let it pass."""
 
 
 @bundle
 class Guidance(NamedTuple):
-    """Table 2: what guides a search. It is never a plan's reward.
+    """The weights of Table 2, which guide a search but are never part of a plan's reward.
 
-    Per second of contact and of sun-pointing, and for each limit that is broken.
-    ``is_contact_by_wait`` counts a contact by the time until it starts, not by its own.
-    ``image_needs`` is what an image needs to count as made, one of ``IMAGE_NEEDS``.
+    They are per second of contact and of sun-pointing, and for each limit that is broken.
+    ``is_contact_by_wait`` counts a contact by the time until it starts, not by its duration.
+    ``image_needs`` is what an image needs to count as made, an index of ``IMAGE_NEEDS``.
     """
 
     gamma: float
@@ -37,7 +37,7 @@ class Guidance(NamedTuple):
 
 
 IMAGE_NEEDS: Final = ("nothing", "limits", "room")
-"""Nothing; battery and recorder within their limits (the text); room on board (the code)."""
+"""Nothing; battery and recorder within limits (the paper); room on board (the authors' code)."""
 
 
 @inlined
@@ -69,8 +69,8 @@ def task_reward(
 ) -> float:
     """Return R(s, a) of Table 2 for a collect or a contact.
 
-    ``worth`` is what an image by each row earns, ``waited_s`` is t_s - t, ``discount`` is gamma
-    to it.
+    ``worth`` is what an image by each row earns, ``waited_s`` is t_s - t, and ``discount`` is gamma
+    to the power of ``waited_s``.
     """
     reward = 0.0
     if track.is_contact[row]:
@@ -146,7 +146,7 @@ class Model:
     def actions(self, state: State, breadth: int) -> Sequence[int]:
         """Return the first ``breadth`` tasks of A(s) in time order, then ``WAIT`` if allowed.
 
-        Of the collects that one access offers only the first feasible one counts.
+        Only the first feasible collect of each access is included.
         """
         collected = self._mask(state)
         rows: list[int] = []

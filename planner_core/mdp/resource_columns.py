@@ -1,16 +1,16 @@
-"""What tasks take of a satellite's battery and recorder, and what a step leaves in them.
+"""What tasks take from a satellite's battery and recorder, and the levels after a step.
 
-The physics of a step stands here once, for the readable model and the compiled search loops alike.
+The physics of a step is here once, for the readable model and the compiled search loops alike.
 
-Both dynamics of the plan model become the same arithmetic. After task ``i`` its battery and
-recorder are known at two clocks; the next task ``j`` then costs a lump:
+Both dynamics of the plan model reduce to the same arithmetic. After task ``i`` the battery and the
+recorder are known, each at a time of its own; the next task ``j`` then costs fixed amounts:
 
 ==================  ============================  =====================================
 column              ``physical``                  ``paper`` (event model)
 ==================  ============================  =====================================
 ``charge_from[i]``  sunlit time when the sun is   sunlit time at the start of i
-                    reached after i (its end,
-                    where the sun needs no turn)
+                    reached after i (its end if
+                    the sun needs no slew)
 ``charge_to[j]``    sunlit time when the sun is   sunlit time at the start of the event
                     left for j                    before j (j's own segment is forgone)
 ``data_from[i]``    end of i                      start of i
@@ -43,11 +43,11 @@ STRICT: Final = 1e-9
 
 @bundle
 class ResourceColumns(NamedTuple):
-    """Battery and recorder of one satellite; shape ``(m,)`` where not a number.
+    """Battery and recorder of one satellite; shape ``(m,)`` unless a number.
 
-    ``charge_top_s[i]`` is the greatest of ``charge_to_s`` up to row ``i``, as turns from the sun
-    take them out of order. ``battery_full`` is the most the battery holds at the start of a task,
-    ``battery_floor`` what it must stay above at its end (see ``idle_energy``).
+    ``charge_top_s[i]`` is the greatest ``charge_to_s`` up to row ``i``, as slews from the sun may
+    put those out of order. ``battery_full`` is the most the battery can hold at a task's start,
+    ``battery_floor`` what it must stay above at the task's end (see ``idle_energy``).
     """
 
     charge_from_s: Floats
@@ -73,7 +73,7 @@ class ResourceColumns(NamedTuple):
 
 
 def resource_columns(problem: Problem, satellite: SatelliteProblem) -> ResourceColumns:
-    """Return the battery and recorder of a satellite; limited by none without resources."""
+    """Return a satellite's battery and recorder, which limit nothing without resources."""
     satellite = with_counted_resources(problem, satellite)
     r = satellite.resources
     start_s, end_s = satellite.start_s, satellite.end_s
@@ -120,7 +120,7 @@ def resource_columns(problem: Problem, satellite: SatelliteProblem) -> ResourceC
 
 
 def with_counted_resources(problem: Problem, satellite: SatelliteProblem) -> SatelliteProblem:
-    """Return the satellite with the resources that count: without any it is limited by none."""
+    """Return the satellite, with limitless resources if the problem is without resources."""
     if problem.use_resources:
         return satellite
     none = np.zeros(len(satellite))

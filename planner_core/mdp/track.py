@@ -23,7 +23,7 @@ from planner_core.problem import (
 from planner_core.problem.transitions import near_spans
 
 NO_TASK: Final = -1
-_SLACK: Final = 1e-12  # a fallback worked out backward must also hold when replayed forward
+_SLACK: Final = 1e-12  # a fallback computed backward must also hold when replayed forward
 _MAX_LABELS: Final = 8
 _MAX_AHEAD: Final = 12
 
@@ -33,16 +33,16 @@ class Track(NamedTuple):
     """One satellite's problem as plain arrays; shape ``(m,)`` unless said otherwise.
 
     ``first_offer`` is the first row of the same access: itself, unless the access offers several
-    collects to choose from. ``next_kept[i]`` and ``next_contact[i]`` are the first row from ``i``
-    on that must be taken and the first contact, m where there is none (shape ``(m + 1,)``).
-    ``fill_ahead[i]`` is about what may be written between the start of row ``i`` and that of the
-    next contact, an image at least; ``least_cost`` and ``least_fill`` are what the cheapest
-    collect takes of the battery and writes. ``fallbacks`` lists the usable contact rows and those
-    that must be taken; ``fallback_after[i]`` is the place in it of the first one after row
+    tasks to choose from. ``next_kept[i]`` and ``next_contact[i]`` are the first row from ``i``
+    on that must be taken and the first contact, m if there is none (shape ``(m + 1,)``).
+    ``fill_ahead[i]`` estimates what is written between the start of row ``i`` and that of the next
+    contact, at least one image; ``least_cost`` and ``least_fill`` are the least that a collect
+    takes from the battery and writes. ``fallbacks`` lists the usable contact rows and those
+    that must be taken; ``fallback_after[i]`` is the index in it of the first one after row
     ``i - 1`` (shape ``(m + 1,)``).
-    ``fallback_*`` hold, for each of them, up to eight pairs (battery needed, recorder
-    allowed) after it, from which the satellite can keep its limits to the end by these rows
-    alone; shape ``(num_fallbacks, 8)``.
+    ``fallback_battery`` and ``fallback_recorder`` hold, for each of them, up to eight pairs
+    (battery needed, recorder allowed) after it, from which the satellite can keep its limits to
+    the end by these rows alone; shape ``(num_fallbacks, 8)``.
     """
 
     start_s: Floats
@@ -75,7 +75,7 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     is_kept[problem.kept_local(satellite)] = True
     access = problem.opportunities.access[satellite.rows]
     contacts = np.flatnonzero((is_contact == 1) & (blocked == 0))
-    # Of the parts of a pass the whole one begins first.
+    # Of the contacts of a pass, the whole one begins first.
     fallbacks = np.union1d(
         contacts[np.unique(access[contacts], return_index=True)[1]], np.flatnonzero(is_kept)
     ).astype(np.int32)
@@ -108,15 +108,15 @@ def compile_track(problem: Problem, satellite: SatelliteProblem, blocked: Bytes)
     if not problem.use_resources:
         return track
     _fill_fallbacks(track)
-    # Where even contacts alone cannot keep the limits, plan task by task and let the referee
-    # say what breaks: there is no plan to protect.
+    # If even contacts alone cannot keep the limits, plan task by task and let the referee report
+    # what breaks: there is no safe plan to protect.
     safe = is_safe(track, NO_TASK, NO_TASK, resources.battery_start, resources.recorder_start)
     lasts = resources.battery_start > resources.battery_min + resources.reserve_start
     return track._replace(is_guarded=bool(safe and (lasts or resources.reserve_start == 0.0)))
 
 
 def _next_of(is_such: Bools) -> Ints:
-    """Return, for each row and for the end, the first such row from there on, or ``m``."""
+    """Return, for each row and for the end, the first row from there on that is such, or ``m``."""
     m = len(is_such)
     found = np.where(np.append(is_such, True), np.arange(m + 1), m)
     return np.minimum.accumulate(found[::-1])[::-1].astype(np.int32)
@@ -131,14 +131,14 @@ def _fill_ahead(
     usable = np.flatnonzero((satellite.kind == CONTACT) & (blocked == 0))
     after = np.searchsorted(usable, rows, side="right")
     wait_s = np.append(satellite.start_s[usable], problem.horizon_s)[after] - satellite.start_s
-    # In the long run the battery pays for a part of the time, and each access is collected once.
+    # In the long run the battery pays for imaging a part of the time, and each access only once.
     busy = r.sunpoint_charge_per_s + r.collect_drain_per_s
     duty = r.sunpoint_charge_per_s / busy if busy > 0.0 else 1.0
     is_collect = (satellite.kind != CONTACT) & (first_offer == rows)
     collects_s = np.where(is_collect, satellite.end_s - satellite.start_s, 0.0)
     until_s = np.concatenate([[0.0], np.cumsum(collects_s)])
     offered_s = until_s[np.append(usable, m)[after]] - until_s[rows]
-    # Where contacts follow each other closely, none may pass once not even one image fits in.
+    # Even if contacts follow each other closely, none may be skipped once no image fits on board.
     image_s = collects_s[is_collect].min() if is_collect.any() else 0.0
     written_s: Floats = np.maximum(image_s, np.minimum(offered_s, duty * wait_s))
     return r.collect_fill_per_s * written_s + r.telemetry_per_s * wait_s
@@ -146,10 +146,10 @@ def _fill_ahead(
 
 @inlined
 def _ahead(track: Track, first: int, step: int, kept: int) -> int:
-    """Return the place of the fallback to look at in a step from ``first`` on; -1 for no more.
+    """Return the index of the fallback to examine at a step from ``first`` on; -1 for no more.
 
-    That is some contacts one after another up to the next task that must be taken, and that
-    task in any case.
+    These are ``_MAX_AHEAD`` rows in order, but none beyond the next task that must be taken, and
+    that task in any case.
     """
     end = len(track.fallbacks)
     at = first + step
@@ -164,10 +164,9 @@ def _ahead(track: Track, first: int, step: int, kept: int) -> int:
 def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: float) -> bool:
     """Return whether limits can be kept to the end from here by idling and contacts alone.
 
-    A battery above its floor lasts as long as the satellite idles, so the recorder is what fills
-    up: either it has room for the telemetry to the end, or some contact after row ``cursor`` must
-    be reached.
-    Tasks that must be taken count as contacts do, and none of them may be passed by.
+    A battery above its floor lasts as long as the satellite idles, so only the recorder can fail:
+    either it has room for the telemetry to the end, or some contact after row ``cursor`` must be
+    reached. Tasks that must be taken are treated like contacts, and none may be skipped.
     The check is sufficient, not necessary (it looks a limited number of contacts ahead).
     """
     resources = track.resources
@@ -204,7 +203,7 @@ def is_safe(track: Track, last: int, cursor: int, battery: float, recorder: floa
 
 @borrowing
 def _fill_fallbacks(track: Track) -> None:
-    """Work backward over the contacts: what each must leave so that the rest can be kept."""
+    """Compute, backward over the fallbacks, the levels after each from which limits can be kept."""
     resources = track.resources
     m = len(track.start_s)
     for at in range(len(track.fallbacks) - 1, -1, -1):
