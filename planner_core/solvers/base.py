@@ -1,4 +1,4 @@
-"""What a solver is, what it may spend, and what it answers."""
+"""What a solver is, what it may spend, and what it returns."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Solution:
     Attributes
     ----------
     proven
-        What the search has proven on the way: no valid plan of the problem earns more. None
-        where it has proven nothing.
+        A bound that the search has proven on the way: no valid plan of the problem earns more.
+        None if it has proven none.
     """
 
     plan: Plan
@@ -46,20 +46,20 @@ class Solution:
 
     @property
     def bound(self) -> float | None:
-        """The value of what is proven."""
+        """The value of the bound that is proven."""
         return None if self.proven is None else self.proven.value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outlook:
-    """Which actions of a state a search looks at: what it misses else, it could not know.
+    """Which actions of a state a search considers.
 
     Attributes
     ----------
     breadth
         How many tasks at most; None for all.
     contact_above
-        How full the recorder is, as a share, before contacts are among them.
+        Recorder level, as a fraction, from which on contacts are among them.
     """
 
     breadth: int | None = None
@@ -72,13 +72,13 @@ class Solver(Protocol):
     Attributes
     ----------
     name, title, about, paper
-        How it is called in the API; what it is; what it does and when to choose it, for those who
-        operate satellites; where the paper describes it.
+        Its name in the API; what it is; what it does and when to choose it, for those who operate
+        satellites; where the paper describes it.
     exact
         Whether it proves its plan optimal when it runs to the end.
     bounds
-        Whether it looks for a bound itself from the first moment on, so that a quick one tells
-        nothing new after it.
+        Whether it computes bounds itself from the start, so that a quick bound after it adds
+        nothing.
     honours
         The rules that its plans never break, whatever the problem.
     """
@@ -93,7 +93,7 @@ class Solver(Protocol):
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions it considers."""
         ...
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:

@@ -1,7 +1,7 @@
 """Forward search (Alg. 1): look a few actions ahead, take the best first one, repeat.
 
-``select_action`` is the listing as one reads it; ``_select_action`` is the same search compiled,
-which ``ForwardSearch`` runs. Tests compare the two.
+``select_action`` follows the listing; ``_select_action`` is the same search compiled, which
+``ForwardSearch`` runs. Tests compare the two.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def select_action(
 ) -> tuple[int, float]:
     """Return the best first action and its value: SELECTACTION of Alg. 1.
 
-    Ties go to the earliest action. ``NOTHING`` where A(s) is empty.
+    Ties go to the earliest action. ``NOTHING`` if A(s) is empty.
     """
     if depth == 0:
         return NOTHING, 0.0
@@ -92,7 +92,7 @@ class Rules(NamedTuple):
 
 @bundle
 class Search(NamedTuple):
-    """What a search looks at and changes while it runs.
+    """What a search reads and changes while it runs.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Search(NamedTuple):
     collected
         1 for targets that are imaged already. Shape ``(num_targets,)``.
     chosen
-        Room for the tasks of A(s) at each depth. Shape ``(depth * breadth,)``.
+        Buffer for the tasks of A(s) at each depth. Shape ``(depth * breadth,)``.
     """
 
     track: Track
@@ -212,8 +212,8 @@ class ForwardSearch:
         metadata={
             "minimum": 1,
             "maximum": 1000,
-            "description": "How many of the next images and contacts are tried at each step; "
-            "sun-pointing comes on top where resources count.",
+            "description": "How many of the next images and contacts are tried at each step, "
+            "besides sun-pointing if resources count.",
         },
     )
     gamma: float = field(
@@ -221,7 +221,7 @@ class ForwardSearch:
         metadata={
             "exclusiveMinimum": 0,
             "maximum": 1,
-            "description": "How much less later images count: a factor for each second.",
+            "description": "Discount factor for each second: how much less later images count.",
         },
     )
     feasibility: Feasibility = field(
@@ -235,36 +235,36 @@ class ForwardSearch:
         default=True,
         metadata={
             "description": "Leave out targets that are imaged already; "
-            "the paper goes on offering them."
+            "the paper keeps offering them."
         },
     )
     breadth_counts: BreadthCounts = field(
         default="tasks",
         metadata={
             "description": "tasks: breadth tasks are tried (the paper); "
-            "one_more: one more than that (the authors' code, which stops after the limit)."
+            "one_more: breadth + 1 tasks (the authors' code, which stops one task too late)."
         },
     )
     discount: Discount = field(
         default="action",
         metadata={
-            "description": "What follows an action is discounted to the start of action: that "
-            "action (the paper); next_action: the best action after it (the authors' code)."
+            "description": "The start to which the value after an action is discounted. action: "
+            "its own (the paper); next_action: the best next action's (the authors' code)."
         },
     )
     contact_counts: ContactCounts = field(
         default="duration",
         metadata={
-            "description": "What a second of contact_reward_per_s is. duration: of the contact "
-            "(the authors' code); wait: of the time until it starts (the paper's equation)."
+            "description": "Which seconds contact_reward_per_s counts. duration: of the contact "
+            "(the authors' code); wait: until the contact starts (the paper's equation)."
         },
     )
     image_needs: ImageNeeds = field(
         default="nothing",
         metadata={
-            "description": "What an image needs to count as made. limits: battery and recorder "
-            "within theirs (the paper); room: room on board (the authors' code); nothing. "
-            "Matters where feasibility is penalty."
+            "description": "What an image needs to count as taken. nothing; limits: battery and "
+            "recorder within limits after it (the paper); room: room on board (the authors' "
+            "code). Matters only if feasibility is penalty."
         },
     )
     contact_reward_per_s: float = field(
@@ -282,7 +282,7 @@ class ForwardSearch:
     contact_above_fraction: float = field(
         default=0.0,
         metadata=contact_above_metadata(
-            "0, the paper's, tries every contact: with few targets the search steps from "
+            "0 (the paper's) tries every contact: with few targets the search goes from "
             "contact to contact. With many stations 0.45 takes far more images."
         ),
     )
@@ -296,14 +296,14 @@ class ForwardSearch:
         metadata={
             "minimum": 0,
             "maximum": 1000,
-            "description": "Moves of a window search on the finished plan, for each access; "
-            "without resources only. The paper has none.",
+            "description": "Moves of a large neighbourhood search on the finished plan, for each "
+            "access; without resources only. The paper has none.",
         },
     )
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions it considers."""
         return Outlook(breadth=self.breadth, contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
@@ -324,7 +324,7 @@ class ForwardSearch:
 
     @property
     def guidance(self) -> Guidance:
-        """Return the weights of Table 2 that steer the search."""
+        """The weights of Table 2 that steer the search."""
         return Guidance(
             gamma=self.gamma,
             contact_reward_per_s=self.contact_reward_per_s,

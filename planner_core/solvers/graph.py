@@ -1,7 +1,7 @@
 """Graph search (Alg. 3): the longest path through all collects that may follow each other.
 
-The path knows agility alone. Where resources count, what it proposes is then walked through
-in order, and only what keeps the limits is taken (``feasibility``).
+The path considers agility alone. If resources count, it is then walked through in order, and only
+tasks that keep the limits are taken (``feasibility``).
 """
 
 from __future__ import annotations
@@ -50,19 +50,19 @@ class Graph:
     feasibility: Feasibility = field(
         default="hard",
         metadata={
-            "description": "hard: walk along the path and take what keeps battery and recorder, "
-            "and contacts as they come; "
-            "penalty: the path as it is, whatever it does to them."
+            "description": "hard: walk along the path and take tasks that keep the limits of "
+            "battery and recorder, and contacts as they come; "
+            "penalty: the path as it is, even if it breaks them."
         },
     )
     contact_above_fraction: float = field(
         default=CONTACT_ABOVE,
-        metadata=contact_above_metadata("Matters where feasibility is hard."),
+        metadata=contact_above_metadata("Matters only if feasibility is hard."),
     )
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions it considers."""
         return Outlook(contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
@@ -98,7 +98,7 @@ class Graph:
 
 
 def _with_kept(problem: Problem, subproblem: Subproblem, path: list[int]) -> list[int]:
-    """Return the path with what must be taken, or the rule's where that does not fit in."""
+    """Return the path with what must be taken, or the rule's plan if that does not fit in."""
     kept = problem.kept_local(subproblem.satellite).tolist()
     whole = sorted({*path, *kept})
     if all(subproblem.satellite.transitions.allows(a, b) for a, b in itertools.pairwise(whole)):

@@ -65,7 +65,7 @@ class Mcts:
     num_simulations: int = field(
         default=500,
         metadata=_described(
-            "Futures that are sampled at each step: more find better plans, and take longer.",
+            "Futures that are sampled at each step: more find better plans, but take longer.",
             minimum=1,
             maximum=1_000_000,
         ),
@@ -79,7 +79,7 @@ class Mcts:
     exploration: float = field(
         default=30.0,
         metadata=_described(
-            "How much is tried that has not turned out well so far: higher looks further afield.",
+            "How much to try actions that have not turned out well so far: higher explores more.",
             minimum=0,
         ),
     )
@@ -94,14 +94,14 @@ class Mcts:
     breadth_counts: BreadthCounts = field(
         default="tasks",
         metadata=_described(
-            "tasks: breadth tasks are tried (the paper); one_more: one more than that "
-            "(the authors' code, which stops after the limit)."
+            "tasks: breadth tasks are tried (the paper); one_more: breadth + 1 tasks "
+            "(the authors' code, which stops one task too late)."
         ),
     )
     gamma: float = field(
         default=0.9999,
         metadata=_described(
-            "How much less later images count: a factor, applied as discount says.",
+            "Discount factor, applied as discount says: how much less later images count.",
             exclusiveMinimum=0,
             maximum=1,
         ),
@@ -109,8 +109,8 @@ class Mcts:
     discount: Literal["per_second", "per_decision"] = field(
         default="per_second",
         metadata=_described(
-            "per_second: gamma to the elapsed time (the paper); "
-            "per_decision: gamma at each action (the authors' code)."
+            "per_second: gamma to the power of the elapsed seconds (the paper); "
+            "per_decision: gamma once at each action (the authors' code)."
         ),
     )
     returns: Literal["with_reward", "literal"] = field(
@@ -137,7 +137,7 @@ class Mcts:
     unimaged_only: bool = field(
         default=True,
         metadata=_described(
-            "Leave out targets that are imaged already; the paper goes on offering them."
+            "Leave out targets that are imaged already; the paper keeps offering them."
         ),
     )
     feasibility: Feasibility = field(
@@ -157,16 +157,16 @@ class Mcts:
     contact_counts: ContactCounts = field(
         default="duration",
         metadata=_described(
-            "What a second of contact_reward_per_s is. duration: of the contact "
-            "(the authors' code); wait: of the time until it starts (the paper's equation)."
+            "Which seconds contact_reward_per_s counts. duration: of the contact "
+            "(the authors' code); wait: until the contact starts (the paper's equation)."
         ),
     )
     image_needs: ImageNeeds = field(
         default="nothing",
         metadata=_described(
-            "What an image needs to count as made. limits: battery and recorder "
-            "within theirs (the paper); room: room on board (the authors' code); nothing. "
-            "Matters where feasibility is penalty."
+            "What an image needs to count as taken. nothing; limits: battery and recorder "
+            "within limits after it (the paper); room: room on board (the authors' code). "
+            "Matters only if feasibility is penalty."
         ),
     )
     contact_reward_per_s: float = field(
@@ -184,15 +184,15 @@ class Mcts:
     contact_above_fraction: float = field(
         default=0.0,
         metadata=contact_above_metadata(
-            "0, the paper's, tries every contact; rollouts heed 0.45 in any case."
+            "0 (the paper's) tries every contact; greedy rollouts use 0.45 in any case."
         ),
     )
 
     window_moves_per_task: float = field(
         default=0.5,
         metadata=_described(
-            "Moves of a window search on the finished plan, for each access; without "
-            "resources only. The paper has none.",
+            "Moves of a large neighbourhood search on the finished plan, for each access; "
+            "without resources only. The paper has none.",
             minimum=0,
             maximum=1000,
         ),
@@ -200,7 +200,7 @@ class Mcts:
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions it considers."""
         return Outlook(breadth=self.breadth, contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
@@ -251,8 +251,8 @@ class Mcts:
     ) -> list[int]:
         track, collected = subproblem.track, subproblem.collected
         guidance, rules = self._guidance, self._rules
-        # A state stays in the tree for at most ``depth`` steps, so no more ever hang together.
-        # Where that is more than memory should hold, the rest is sampled by rollouts alone.
+        # A state stays in the tree for at most ``depth`` steps, which limits the number of nodes.
+        # If that is more than memory should hold, the rest is sampled by rollouts alone.
         num_nodes = min(
             self.num_simulations * (self.depth + 1) + 2, MAX_ACTIONS // (rules.breadth + 1)
         )

@@ -36,7 +36,7 @@ class Rules(NamedTuple):
 
 @bundle
 class Path(NamedTuple):
-    """Room for one simulation; shape ``(depth,)``, ``options`` of ``(breadth + 1,)``."""
+    """Buffers for one simulation; shape ``(depth,)``, ``options`` of ``(breadth + 1,)``."""
 
     edge: Ints
     action: Ints
@@ -48,7 +48,7 @@ class Path(NamedTuple):
 
 @bundle
 class Step(NamedTuple):
-    """What the simulations of one step look at, beside the tree, and what they leave.
+    """What the simulations of one step read, besides the tree, and what they leave.
 
     Attributes
     ----------
@@ -75,8 +75,8 @@ class Step(NamedTuple):
 def step_for(
     track: Track, rules: Rules, guidance: Guidance, worth: Floats, collected: Bytes, seed: int
 ) -> Step:
-    """Return what the simulations of a plan's steps look at, with room for them."""
-    # Without resources alone A(s) hangs on the last task only.
+    """Return what the simulations of a plan's steps read, with buffers for them."""
+    # Only without resources is A(s) given by the last task and the images taken.
     num_rows = 0 if track.use_resources else len(track.start_s)
     return Step(
         track=track,
@@ -140,7 +140,7 @@ def _enter_tasks(
 
 @borrowing
 def expand(tree: Tree, step: Step, node: int) -> None:
-    """Lines 5-8: enter A(s) with N = Q = 0. Its first task stands first, ``WAIT`` last."""
+    """Enter A(s) with N = Q = 0 (lines 5-8). Its tasks come in order of time, ``WAIT`` last."""
     track = step.track
     begin = tree.used[1]
     last, battery, recorder = tree.last[node], tree.battery[node], tree.recorder[node]
@@ -158,7 +158,7 @@ def expand(tree: Tree, step: Step, node: int) -> None:
 def random_action(
     step: Step, cursor: int, last: int, battery: float, recorder: float
 ) -> tuple[int, int]:
-    """Return any action of A(s) and the first task of A(s), or (m, m) at the end."""
+    """Return a random action of A(s) and the first task of A(s), or (m, m) at the end."""
     track, rules, actions = step.track, step.rules, step.path.options
     m = len(track.start_s)
     count = _enter_tasks(step, actions, 0, cursor, last, battery, recorder)
@@ -174,7 +174,7 @@ def random_action(
 def greedy_action(
     step: Step, cursor: int, last: int, battery: float, recorder: float
 ) -> tuple[int, float]:
-    """Return what the rule takes next, or m, and its discount, 0 where that is to be worked out."""
+    """Return the task that the rule takes next, or m, and its discount, 0 if not known yet."""
     track, rules, successors, collected = step.track, step.rules, step.successors, step.collected
     row = cursor
     if not track.use_resources and cursor == last:

@@ -35,7 +35,7 @@ ROOT: Final = 0
 
 @borrowing_inner
 def _simulate(tree: Tree, step: Step) -> None:
-    """SIMULATE and ROLLOUT from the root; keeps the sequence of greatest return in ``best``."""
+    """Run SIMULATE and ROLLOUT from the root; keep the best return and its actions in ``step``."""
     track, rules, guidance = step.track, step.rules, step.guidance
     worth, collected, path = step.worth, step.collected, step.path
     m = len(track.start_s)
@@ -48,8 +48,8 @@ def _simulate(tree: Tree, step: Step) -> None:
     is_rollout = False
     while d < depth:
         if not is_rollout and tree.first_edge[node] < 0:
-            # The listing rolls out from a new state; the root itself is searched at once. What
-            # may be done in a state is looked for when it is met again, which most never are.
+            # The listing rolls out from a new state; the root itself is searched at once. A(s) of
+            # a state is computed only when it is met again, which most never are.
             is_met = node == ROOT or tree.first_edge[node] == ROLLED_OUT
             if node != ROOT and not has_room(tree, rules.breadth):
                 is_rollout = True
@@ -152,7 +152,7 @@ def search(tree: Tree, step: Step, num_simulations: int, stop: Bytes) -> int:
 
 @borrowing
 def sunpoint_instead(tree: Tree, step: Step, edge: int) -> int:
-    """Return the edge of sun-pointing where the action of ``edge`` earns nothing by itself.
+    """Return the edge of sun-pointing if the action of ``edge`` earns nothing by itself.
 
     Without resources A(s) has no sun-pointing; it is added here, and lets the first task pass.
     """
@@ -175,7 +175,7 @@ def sunpoint_instead(tree: Tree, step: Step, edge: int) -> int:
         return edge
     wait = end - 1
     if tree.action[wait] != WAIT:
-        # It need not stand beside the others, since only what hangs below it is kept.
+        # It need not be next to the other edges, since only the branch below it is kept.
         wait = tree.used[1]
         new_edge(tree, 0, WAIT)
     if tree.child[wait] == UNSEEN:

@@ -1,7 +1,7 @@
-"""The tasks of A(s), which simulations ask for again and again.
+"""The tasks of A(s), which simulations need again and again.
 
-Where agility alone counts, A(s) hangs on the last task and on what is imaged by then. The first
-tasks that may follow each one are therefore looked for once and kept.
+If agility alone counts, A(s) depends on the last task and on the targets imaged by then. The first
+tasks that may follow each task are therefore computed once and kept.
 """
 
 from __future__ import annotations
@@ -17,15 +17,14 @@ from planner_core.mdp.track import Track
 from planner_core.problem import Bytes, Floats, Ints
 
 MOST: Final = 16
-"""Tasks kept for each: more than a breadth, since some of them are imaged before they are asked
-for."""
+"""Tasks kept for each: more than a breadth, since some are imaged before they are needed."""
 
 UNKNOWN: Final = -1
 
 
 @bundle
 class Successors(NamedTuple):
-    """The first tasks that may follow each one directly, of different accesses, in time order.
+    """The first tasks that may follow each task directly, of different accesses, in time order.
 
     Those of task ``i`` begin at ``MOST * (i + 1)``, those of the start at 0. Shape
     ``(MOST * (m + 1),)`` unless said otherwise.
@@ -47,7 +46,7 @@ class Successors(NamedTuple):
 
 
 def no_successors(num_rows: int, imaged: Bytes) -> Successors:
-    """Return room for the successors of so many tasks; none where none are kept."""
+    """Return buffers for the successors of the start and of ``num_rows`` tasks, none known yet."""
     return Successors(
         row=np.empty(MOST * (num_rows + 1), dtype=np.int32),
         discount=np.empty(MOST * (num_rows + 1)),

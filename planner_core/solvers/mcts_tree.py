@@ -2,7 +2,7 @@
 
 States reached along different paths almost never coincide, because the images taken are part
 of the state. The hash table of the listing is therefore a tree; after each step the branch
-that was taken is kept and its estimates live on.
+that was taken is kept with its estimates.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from planner_core.problem import Floats, Ints
 
 UNSEEN: Final = -1
 ROLLED_OUT: Final = -2
-"""In place of a first edge: the state has been met once, and A(s) is not entered yet."""
+"""In place of a first edge: the state has been met once, but A(s) has not been entered."""
 
 
 @bundle
 class Tree(NamedTuple):
     """States and actions of the search, both numbered in order of appearance.
 
-    A node's actions stand side by side from ``first_edge[node]``, which is ``UNSEEN`` or
-    ``ROLLED_OUT`` before; ``child`` of an edge is the node it leads to, or ``UNSEEN``.
+    A node's actions are contiguous from ``first_edge[node]`` on, which is ``UNSEEN`` or
+    ``ROLLED_OUT`` before they are entered; ``child`` of an edge is its node, or ``UNSEEN``.
     Shape ``(num_nodes,)`` and ``(num_edges,)``; ``used`` counts both.
     """
 
@@ -72,7 +72,7 @@ def new_edge(tree: Tree, node: int, action: int) -> None:
 def has_room(tree: Tree, breadth: int) -> bool:
     """Return whether a state below the root may be added or expanded.
 
-    The root of this step and of the next always find room for A(s) and where it leads.
+    The roots of this step and of the next always have room for A(s) and the states it leads to.
     """
     nodes_left = len(tree.cursor) - int(tree.used[0])
     actions_left = len(tree.action) - int(tree.used[1])
@@ -81,7 +81,7 @@ def has_room(tree: Tree, breadth: int) -> bool:
 
 @borrowing_inner
 def choose(tree: Tree, node: int, exploration: float) -> int:
-    """Line 11: the edge of greatest upper confidence; one that was never tried comes first."""
+    """Return the edge of greatest upper confidence bound (line 11); untried ones come first."""
     first = int(tree.first_edge[node])
     total = 0
     for edge in range(first, first + tree.num_edges[node]):
@@ -99,7 +99,7 @@ def choose(tree: Tree, node: int, exploration: float) -> int:
 
 @kernel
 def copy_branch(old: Tree, new: Tree, root: int) -> None:
-    """Make ``root`` of ``old`` node 0 of ``new``, with all that hangs below it."""
+    """Copy ``root`` of ``old``, with all that is below it, to node 0 of ``new``."""
     new.used[0] = 0
     new.used[1] = 0
     waiting = np.empty(old.used[0] + 1, dtype=np.int32)

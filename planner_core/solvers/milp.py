@@ -38,8 +38,8 @@ class Milp:
         default="antichain",
         metadata={
             "description": "antichain: one row for each set of tasks that exclude each other, "
-            "and cutting planes; without resources HiGHS then only proves what is left. "
-            "pairwise: the paper's, one row for each such pair."
+            "and cutting planes; without resources HiGHS then only closes the remaining gap. "
+            "pairwise: the paper's, one row for each pair of such tasks."
         },
     )
     gap: float = field(
@@ -55,7 +55,7 @@ class Milp:
         metadata={
             "minimum": 0,
             "maximum": 1000,
-            "description": "Rounds of cutting planes before the search, at most (antichain only).",
+            "description": "Most rounds of cutting planes before the search (antichain only).",
         },
     )
 
@@ -64,18 +64,18 @@ class Milp:
         metadata={
             "minimum": 0,
             "maximum": 100_000,
-            "description": "Moves of a local search for each opportunity, that the proof may "
-            "start from a good plan (without resources only).",
+            "description": "Moves of a local search for each opportunity, so that the proof "
+            "starts from a good plan (without resources only).",
         },
     )
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions it considers."""
         return Outlook()
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
-        """Return the best plan; the same one for the same seed where the budget suffices."""
+        """Return the best plan; the same one for the same seed if the budget suffices."""
         fixed = replace(problem, pointing=None)
         if self.formulation == "antichain" and is_free(fixed):
             effort = Effort(moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds)

@@ -1,15 +1,15 @@
-r"""Plans of simple planners where the battery charges between turns to the sun only.
+r"""Plans of simple planners for batteries that charge only between slews to the sun and back.
 
-Who takes each image as it comes goes to the sun after every one of them. What helps is a price of
-energy: an image costs what it draws and the charge that its two turns forgo, and next to other
-images hardly more than what it draws. Taking ``j`` after ``i`` so costs
+A planner that takes each image as it comes slews to the sun after every one of them. A price of
+energy avoids that: an image costs what it draws and the charge that its two slews forgo, but next
+to other images hardly more than what it draws. Taking ``j`` after ``i`` thus costs
 :math:`\mu\,(d_j + f_j - t_j - g_{ij})` with the draw :math:`d`, the charge :math:`f` up to the
-arrival at the sun and :math:`t` up to the departure from it, and :math:`g` where there is no time
-between the two. The price follows the battery, :math:`\mu = \mu_0\, e^{\kappa (0.6 - b)}`: what is
-nearly full is cheap.
+arrival at the sun and :math:`t` up to the departure from it, less :math:`g` if there is no time for
+the sun between the two. The price depends on the battery level :math:`b`,
+:math:`\mu = \mu_0\, e^{\kappa (0.6 - b)}`: energy is cheap while the battery is nearly full.
 
 A few dozen pairs of :math:`\mu_0` and :math:`\kappa` are tried on each mission, in milliseconds
-each, and the best plan counts.
+each, and the best plan is kept.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ from planner_core.solvers.base import Solution
 from planner_core.solvers.sequential import Subproblem
 
 _PRICES: Final = (0.0, 0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2)
-"""Of an image's worth, for what an image draws."""
+"""Of the energy that an image draws, as shares of an image's worth."""
 _FOLLOWING: Final = (1.0, 2.0, 4.0, 6.0)
 _CONTACTS_ABOVE: Final = (0.45, 0.7)
-"""How full the recorder is before a contact is worth its power."""
+"""Recorder levels from which on a contact is worth its power."""
 _AHEAD: Final = 40
 """Feasible tasks that a look ahead compares."""
 _MOVES: Final = 10  # of the choice search, for each satellite
 _MOST_UNITS: Final = 2000
-_NEUTRAL: Final = 0.6  # the battery at which energy has its price
+_NEUTRAL: Final = 0.6  # the battery level at which the price of energy is mu_0
 
 
 class Priced(NamedTuple):
@@ -54,7 +54,7 @@ class Priced(NamedTuple):
     worth
         What its new targets earn.
     price, following
-        Price of energy in images for an image's draw, and how it follows the battery.
+        Price of an image's draw, in images, and how strongly it depends on the battery (kappa).
     """
 
     rows: list[int]
@@ -64,12 +64,12 @@ class Priced(NamedTuple):
 
 
 def is_priced(problem: Problem, subproblem: Subproblem) -> bool:
-    """Return whether the subproblem's satellite charges at the sun only."""
+    """Return whether the subproblem's satellite must slew to the sun to charge."""
     return problem.use_resources and subproblem.satellite.resources.sun_pointing == "slew"
 
 
 def best_priced(problem: Problem, subproblem: Subproblem, *, looks_ahead: bool) -> Priced:
-    """Return the best plan over all prices, of the rule or with a look ahead at what follows."""
+    """Return the best plan over all prices, by the rule or by looking ahead at what follows."""
     track = subproblem.track
     worth = np.where(track.is_contact == 1, 0.0, problem.worth[subproblem.satellite.rows])
     is_new = (track.is_contact == 0) & (subproblem.collected[track.site] == 0)
@@ -112,7 +112,7 @@ def better_of(
 
 
 def _typical(track: Track, worth: Floats, is_new: Bytes) -> tuple[float, float]:
-    """Return what an image draws and earns, about; something positive in any case."""
+    """Return roughly what an image draws and earns; both are always positive."""
     offered = np.flatnonzero(is_new & (worth > 0.0))
     if len(offered) == 0:
         return 1.0, 1.0
@@ -122,7 +122,7 @@ def _typical(track: Track, worth: Floats, is_new: Bytes) -> tuple[float, float]:
 
 @kernel
 def values_ahead(network: Network, worth: Floats, per_energy: float) -> Floats:
-    """Return what can be gained after each task, energy paid for and targets seen as many.
+    """Return what can be gained after each task, less the energy; targets may count repeatedly.
 
     Backward in one pass over the arcs. Shape ``(m,)``.
 
@@ -163,10 +163,10 @@ def priced_plan(
     Parameters
     ----------
     ahead
-        What each task leaves to be gained. Shape ``(m,)``.
+        What can be gained after each task. Shape ``(m,)``.
     breadth
-        How many of the next feasible tasks are compared. With 1 that is the rule, which
-        takes the next one that pays for itself.
+        How many of the next feasible tasks are compared. With 1 this is the rule, which takes
+        the next one that pays for itself.
     """
     m = len(worth)
     rows = np.empty(m, dtype=np.int32)
@@ -190,7 +190,7 @@ def priced_plan(
             seen += 1
             if value > best:
                 best, is_chosen = value, row
-            # Nothing beyond it is feasible, or it is there because it is needed.
+            # A(s) ends with a task that must be taken; a contact is offered only when needed.
             if must:
                 break
         if is_chosen < 0:
@@ -208,7 +208,7 @@ def energy_of(track: Track, last: int, row: int) -> float:
     """Return the energy that taking a task costs: its draw, and the charge forgone for it."""
     resources = track.resources
     charge_from_s = resources.charge_from_s[last] if last >= 0 else 0.0
-    # Beyond the departure the charge is forgone until the sun is reached again.
+    # From the departure on, charge is forgone until the sun is reached again.
     until_s = max(resources.charge_to_s[row], charge_from_s)
     return float(
         resources.battery_cost[row]
@@ -217,10 +217,10 @@ def energy_of(track: Track, last: int, row: int) -> float:
 
 
 def with_choices(problem: Problem, solution: Solution, budget: Budget, seed: int) -> Solution:
-    """Return an answer after a few moves that settle each target on one of its times.
+    """Return a solution improved by a few moves that settle each target on one of its times.
 
-    A better batch of images often wants several visits to the sun moved at once, which no search
-    step by step does. Where no satellite turns to the sun the answer stays as it is.
+    A better batch of images often requires several visits to the sun to be moved at once, which no
+    step-by-step search does. If no satellite slews to the sun, the solution is unchanged.
     """
     turning = [s for s in problem.satellites if s.resources.sun_pointing == "slew" and len(s)]
     if not (problem.use_resources and turning) or budget.is_spent():

@@ -39,7 +39,7 @@ def solver_class(name: str) -> type[Solver]:
     Raises
     ------
     UnknownSolver
-        Where there is none.
+        If there is none.
     """
     if name not in SOLVERS:
         known = ", ".join(sorted(SOLVERS))
@@ -52,9 +52,9 @@ def solver_class(name: str) -> type[Solver]:
 
 
 def outlook_of(name: str, params: Mapping[str, Any]) -> Outlook:
-    """Return which actions a search looked at, as an older release may have noted it.
+    """Return which actions a search considered, by parameters perhaps stored by an older release.
 
-    What the solver has no parameter for any more does not count, nor does a solver that is gone.
+    Parameters that the solver no longer has are ignored; a solver that is gone has no limits.
     """
     if name not in SOLVERS:
         return Outlook()

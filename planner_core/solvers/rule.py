@@ -42,7 +42,7 @@ class Rule:
     contact_above_fraction: float = field(
         default=CONTACT_ABOVE,
         metadata=contact_above_metadata(
-            "The paper's rule is 0, every contact, which costs images."
+            "The paper's rule has 0: every contact, which costs images."
         ),
     )
     feasibility: Feasibility = field(
@@ -56,15 +56,15 @@ class Rule:
     thresholds: Literal["text", "code"] = field(
         default="text",
         metadata={
-            "description": "When resources allow a task. text: battery above and recorder not "
-            "above its limit after it (the paper); code: battery not empty, recorder not full, "
-            "and no collects while the recorder is half full or more (the authors' code)."
+            "description": "When resources allow a task. text: battery above its limit and "
+            "recorder not above its own after the task (the paper); code: battery not empty, "
+            "recorder not full, no collects from half full on (the authors' code)."
         },
     )
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions it considers."""
         return Outlook(contact_above=self.contact_above_fraction)
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:

@@ -1,4 +1,4 @@
-"""How the paper's single-satellite methods plan several: one after another."""
+"""How the paper's single-satellite methods plan several satellites: one after another."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Subproblem:
     collected
         1 for each target that is taken. Shape ``(num_targets,)``; a turn works on a copy.
     report
-        Call with the fraction of this turn and the reward it has gathered.
+        To be called with the fraction of this turn that is done and the reward gathered in it.
     """
 
     satellite: SatelliteProblem
@@ -83,21 +83,21 @@ def plan_in_turn(problem: Problem, budget: Budget, plan_one: PlanSubproblem) -> 
 
 
 def _order(problem: Problem) -> list[int]:
-    """Return the satellites in turn: first those that must take something, and so need contacts."""
+    """Return the satellites in turn, first those that must take something and so need contacts."""
     is_bound = [bool(len(problem.kept_local(s))) for s in problem.satellites]
     return sorted(range(len(is_bound)), key=lambda index: not is_bound[index])
 
 
 def _rest_by_rule(track: Track, collected: Bytes, taken: list[int]) -> list[int]:
-    """Return what the rule adds to a search that was cut short, so that no hour stays empty."""
+    """Return what the rule adds to a search cut short, so that the horizon's rest is not empty."""
     rows = np.array(taken, dtype=np.int32)
     return [int(row) for row in rule_plan(track, collected, True, True, CONTACT_ABOVE, rows, False)]
 
 
 def _is_wasted(problem: Problem, satellite: SatelliteProblem) -> Bytes:
-    """Return 1 for each collect that earns nothing where another of its target earns something.
+    """Return 1 for each collect that earns nothing while another one of its target earns something.
 
-    Whoever takes tasks as they come would have the target imaged for nothing.
+    A planner that takes tasks as they come would have the target imaged for nothing.
     """
     is_image = satellite.kind != CONTACT
     wasted = np.zeros(len(satellite), dtype=np.uint8)
@@ -124,7 +124,7 @@ def blocked_rows(problem: Problem, satellite: SatelliteProblem, taken: list[int]
     for station in np.unique(table.site[booked]):
         there = booked[table.site[booked] == station]
         own = np.flatnonzero((satellite.kind == CONTACT) & (satellite.site == station))
-        # Those that have begun before the end, without those that end before the start.
+        # Contacts that begin before this one ends, less those that end before it starts.
         num_busy = np.searchsorted(np.sort(table.start_s[there]), satellite.end_s[own])
         num_busy -= np.searchsorted(
             np.sort(table.end_s[there]), satellite.start_s[own], side="right"

@@ -16,12 +16,12 @@ from planner_core.mdp.track import NO_TASK, Track
 from planner_core.problem import Bytes, Ints
 
 CONTACT_ABOVE: Final = 0.45
-"""How full the recorder is before a contact is worth its power. The paper's mission keeps most
-images between 0.2 and 0.45, two satellites over cities with 36 stations from 0.4 on."""
+"""The recorder level from which on a contact is worth its power. The paper's mission yields the
+most images between 0.2 and 0.45, two satellites over cities with 36 stations from 0.4 on."""
 
 
 def contact_above_metadata(note: str) -> dict[str, object]:
-    """Return what the API says of a solver's ``contact_above_fraction``, and a note of its own."""
+    """Return the API's metadata of a solver's ``contact_above_fraction``, with a note."""
     return {
         "minimum": 0,
         "maximum": 1,
@@ -51,10 +51,10 @@ def naive_select_action(
 ) -> int:
     """Return the row that NAIVESELECTACTION takes next, or ``m`` when none is left.
 
-    Tasks that it refuses are what it sun-points through. The limits are those of the text
-    (battery above its minimum, recorder not above its maximum) or, with ``follows_code``, of
-    the authors' code (battery not empty, recorder not full, no collects from half full on).
-    In the hard form those of the plan model come on top.
+    It sun-points through tasks that it refuses. The limits are those of the text (battery above its
+    minimum, recorder not above its maximum) or, with ``follows_code``, of the authors' code
+    (battery not empty, recorder not full, no collects from half full on). With ``is_hard`` the
+    limits of the plan model apply as well.
     """
     m = len(track.start_s)
     row = cursor
