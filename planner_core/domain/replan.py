@@ -100,7 +100,7 @@ class Replan:
         their instants, and each later one becomes the opportunity that starts nearest to it.
     flown
         Actions that began before the horizon, by which states are carried to its start. A
-        satellite's last one before its state says where that looked, if nothing else does.
+        satellite's last one before its state says where it looked then, if nothing else does.
     before
         Older states, for satellites whose newer ones do not say what is on board: that follows from
         these and from what was flown since, and the newer ones correct how much it is.

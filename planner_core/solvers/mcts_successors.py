@@ -32,7 +32,7 @@ class Successors(NamedTuple):
     Attributes
     ----------
     known
-        How many a task has, or ``UNKNOWN`` before they are looked for. Shape ``(m + 1,)``.
+        How many a task has, or ``UNKNOWN`` before they are computed. Shape ``(m + 1,)``.
     discount
         Of each, from the start of the task before it.
     imaged

@@ -28,7 +28,7 @@ class Subproblem:
     Attributes
     ----------
     collected
-        1 for each target that is taken. Shape ``(num_targets,)``; a turn works on a copy.
+        1 for each target that is taken. Shape ``(num_targets,)``; each turn works on a copy.
     report
         To be called with the fraction of this turn that is done and the reward gathered in it.
     """
