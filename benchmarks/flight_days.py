@@ -121,7 +121,7 @@ def main() -> None:
     print(f"|{'---|' * (len(_FIGURES) + 3)}")
     with ThreadPoolExecutor(max_workers=2) as pool:
         for name in options.variants:
-            # Free starts are refused where turns begin and end in motion.
+            # Continuous starts are refused where turns begin and end in motion.
             if name.startswith("continuous") and not options.first_release:
                 continue
             path = options.folder / f"{name.replace(', ', '-').replace(' ', '-')}.json"

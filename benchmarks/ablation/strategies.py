@@ -177,7 +177,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "multipliers of contacts": _OF_AGE,
             "queues": _OF_AGE,
             "plans by their contacts": _OF_AGE,
-            "windows with free starts": _FREE,
+            "windows with continuous starts": _FREE,
             # Their first tables alone take six seconds.
             "multipliers of chains": {"continuous-1000": 30.0},
             "exhaust": _RESOURCES | _SMALL,

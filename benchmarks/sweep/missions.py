@@ -161,7 +161,7 @@ def _outages(
 
 
 def _with_starts(rng: np.random.Generator, scenario: Scenario) -> Scenario:
-    """Return the scenario with spaced or free starts, or with an image's quality, or as it is."""
+    """Return the scenario with spaced or continuous starts, with image quality, or as it is."""
     kind = rng.choice(["middle", "middle", "spaced", "free", "quality"])
     if kind == "spaced":
         return replace(scenario, collect_spacing_s=float(rng.choice([15.0, 60.0])))

@@ -20,7 +20,7 @@ MAX_PAIRS: Final = 8_000_000
 """Of tasks near each other in a program, of about 100 bytes each; followers in tables of starts."""
 
 MAX_FOLLOWERS: Final = 30_000_000
-"""Kept by a search with free starts, of 12 bytes each."""
+"""Kept by a search with continuous starts, of 12 bytes each."""
 
 MAX_DATA_LEVELS: Final = 1200
 MAX_ENERGY_LEVELS: Final = 1500
@@ -76,7 +76,7 @@ LABELS_PER_CELL: Final = 2
 ROUTE_LABELS: Final = 20_000
 ROUTE_BUCKETS: Final = 4096
 ROUTE_TASKS: Final = 64
-"""Of a window with free starts."""
+"""Of a window with continuous starts."""
 
 LARGE_PROGRAM: Final = 5000
 """Columns, beyond which an interior point method finds an optimum of the relaxation sooner."""

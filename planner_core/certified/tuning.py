@@ -39,7 +39,7 @@ class Tuning:
     last_step, last_step_of_few
         How far in the last one, as a share of that; and where epochs are few.
     begin, begin_of_chains
-        The multipliers at first, as a share of what targets are worth; with free starts.
+        The multipliers at first, as a share of what targets are worth; with continuous starts.
     newest_share
         Of an epoch's multipliers in the mean.
     moves_per_epoch
@@ -81,7 +81,7 @@ class Tuning:
     widths_s
         The narrowest and the widest cells of start times.
     longest_piece_s
-        Of a day, that is bounded as a whole with free starts.
+        Of a day, that is bounded as a whole with continuous starts.
     tidy_s
         What a label's second is worth less than a target for; and what separates two pieces.
     beginning

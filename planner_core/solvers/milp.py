@@ -13,7 +13,7 @@ from planner_core.budget import Budget
 from planner_core.certified.driver import Effort
 from planner_core.certified.mip.model import Formulation
 from planner_core.certified.strategies.every import solved
-from planner_core.certified.strategies.supports import is_free
+from planner_core.certified.strategies.supports import is_agility_only
 from planner_core.certified.strategies.whole_program import WholeProgram
 from planner_core.problem import Problem
 from planner_core.solvers.base import Constraint, Outlook, Solution
@@ -77,7 +77,7 @@ class Milp:
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
         """Return the best plan; the same one for the same seed if the budget suffices."""
         fixed = replace(problem, pointing=None)
-        if self.formulation == "antichain" and is_free(fixed):
+        if self.formulation == "antichain" and is_agility_only(fixed):
             effort = Effort(moves_per_task=self.moves_per_task, max_rounds=self.cut_rounds)
             return solved(fixed, budget, seed, self.gap, effort)
         program = WholeProgram(

@@ -288,7 +288,7 @@ def test_after_a_long_wait_it_is_at_the_sun() -> None:
 
 
 def test_accesses_open_once_they_can_be_turned_to() -> None:
-    """With free starts: no start before, and the first one is offered."""
+    """With continuous starts: no start before, and the first one is offered."""
     begin = hours(1).start
     horizon = Horizon(start=begin, end=begin + timedelta(hours=1))
     own = satellite(orbit()).id

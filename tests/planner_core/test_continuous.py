@@ -59,7 +59,7 @@ AGILITIES = st.sampled_from(
 
 
 def best_reward(problem: Problem) -> float:
-    """Return the best reward of one satellite with free starts, by trying every sequence.
+    """Return the best reward of one satellite with continuous starts, by trying every sequence.
 
     It turns faster than its lines of sight, so each task is best begun as early as it can be.
     """
@@ -195,7 +195,7 @@ def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
 
 
 def test_what_bounds_fixed_starts_is_not_taken_for_free_ones() -> None:
-    """Found among the opportunities alone, such a bound may be below a plan with free starts."""
+    """A bound over the opportunities alone may lie below a plan with continuous starts."""
     problem = flat_problem(3, num_targets=14, horizon_s=700.0)
     grid = replace(problem, continuous_starts=False, pointing=None)
     bound = Certified().solve(grid, Budget(), 0).proven

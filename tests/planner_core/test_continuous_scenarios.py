@@ -48,7 +48,7 @@ def own_starts(judged: Judged) -> list[int]:
     ]
 
 
-def test_free_starts_gain_images_that_the_referee_grants(judged: Judged) -> None:
+def test_continuous_starts_gain_images_that_the_referee_grants(judged: Judged) -> None:
     fixed = plan_scenario(
         replace(scenario(), continuous_starts=False), Certified(), 0, Budget()
     ).timeline
@@ -71,7 +71,7 @@ def test_every_solver_answers_such_a_scenario(name: str, use_resources: bool) ->
     assert answer.timeline.reward <= answer.bound.value + 1e-9
 
 
-def test_each_target_left_out_has_a_reason_true_of_free_starts(judged: Judged) -> None:
+def test_each_target_left_out_has_a_reason_true_of_continuous_starts(judged: Judged) -> None:
     """Whatever is said to displace actions fits once they are gone, by the referee."""
     problem, plan = judged.problem, judged.solution.plan
     left = [o for o in judged.outcomes if o.reason is not None and o.reason.blocking]

@@ -1,4 +1,4 @@
-"""One satellite's tasks with free starts, cut into cells of starts.
+"""One satellite's tasks with continuous starts, cut into cells of starts.
 
 What labels over these cells need of each task is told once: the tasks that it can lead to, the bit
 by which it is remembered while its access is open, and by how much a chain that leaves a task out

@@ -1,4 +1,4 @@
-"""Chains of tasks with free starts, as an oracle."""
+"""Chains of tasks with continuous starts, as an oracle."""
 
 from __future__ import annotations
 

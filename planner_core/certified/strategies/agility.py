@@ -181,7 +181,9 @@ class AgilitySearch:
             gap = max(bounds[-1] - self.best.better, 1e-9)
             # Until the relaxation is nearly as low as the subgradient's bound, zero-half cuts
             # mislead.
-            num_added = master.cut(taken, with_zero_half_cuts=bounds[-1] <= start + TUNING.near * gap)
+            num_added = master.cut(
+                taken, with_zero_half_cuts=bounds[-1] <= start + TUNING.near * gap
+            )
             is_stalled = (
                 len(bounds) > TUNING.patience
                 and bounds[-1 - TUNING.patience] - bounds[-1] < TUNING.little * gap

@@ -46,7 +46,7 @@ def windows(search: Search) -> Iterator[None]:
 
 
 class FreeStarts:
-    """The search for plans with free starts, from the best plan at its beginning."""
+    """The search for plans with continuous starts, from the best plan at its beginning."""
 
     def __init__(self, best: Incumbent, seed: int) -> None:
         self._best = best
@@ -59,7 +59,7 @@ class FreeStarts:
 
 
 def chain_multipliers(search: Search) -> Iterator[None]:
-    """Ascend on chains of tasks with free starts, in slices that each prove a bound."""
+    """Ascend on chains of tasks with continuous starts, in slices that each prove a bound."""
     best = search.best
     for proven in ascend_on_chains(search.problem, search.budget.stop):
         if proven is not None:
@@ -73,7 +73,7 @@ def chain_multipliers(search: Search) -> Iterator[None]:
 def fixed_starts(search: Search) -> Iterator[None]:
     """Plan among the opportunities' own starts, and insert tasks that fit in between.
 
-    The bound of that search does not hold for plans with free starts, so it is not reported.
+    The bound of that search does not hold for plans with continuous starts, so it is not reported.
     """
     budget, best = search.budget, search.best
     part = budget.part(1.0, lambda progress: budget.report(replace(progress, bound=None)))
@@ -120,7 +120,7 @@ def with_own_starts(problem: Problem, solution: Solution, budget: Budget) -> Sol
     if solution.termination is Termination.OPTIMAL and solution.proven is None:
         solution = replace(solution, termination=Termination.HORIZON_COMPLETE)
     if problem.pointing is None or solution.proven is not None or budget.is_cancelled:
-        # A solution with a bound was searched with free starts already.
+        # A solution with a bound was searched with continuous starts already.
         return solution
     if problem.use_resources:
         plan = filled_with_resources(problem, solution.plan, Budget())

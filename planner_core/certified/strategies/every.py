@@ -22,19 +22,19 @@ from planner_core.certified.strategies import (
 from planner_core.certified.strategies.supports import (
     fits_a_program,
     has_choice_of_starts,
-    has_free_starts,
-    has_free_starts_alone,
-    has_free_starts_with_resources,
+    has_continuous_starts,
+    has_continuous_starts_alone,
+    has_continuous_starts_with_resources,
     has_one_start_each,
     has_steady_worth,
+    is_agility_only_fleet,
+    is_agility_only_satellite,
     is_aging,
     is_aging_alone,
     is_aging_but_no_fleet,
     is_aging_in_programs,
     is_aging_on_board,
     is_alone_with_limits,
-    is_free_fleet,
-    is_free_satellite,
     is_large,
     is_large_free_fleet,
     is_shared,
@@ -94,14 +94,14 @@ STRATEGIES: Final = (
     ),
     Strategy(
         name="cutting planes",
-        supports=is_free_satellite,
+        supports=is_agility_only_satellite,
         slices=agility.cutting_planes,
         begin=Begin.STALLED,
     ),
     # Without resources, a fleet.
     Strategy(
         name="multipliers of a fleet's paths",
-        supports=is_free_fleet,
+        supports=is_agility_only_fleet,
         slices=fleet.fleet_multipliers,
     ),
     Strategy(
@@ -244,33 +244,33 @@ STRATEGIES: Final = (
         slices=half_life.program_windows,
         begin=Begin.STALLED,
     ),
-    # Free starts.
+    # Continuous starts.
     Strategy(
         name="fixed starts",
-        supports=has_free_starts_with_resources,
+        supports=has_continuous_starts_with_resources,
         slices=continuous.fixed_starts,
     ),
     Strategy(
         name="insertion",
-        supports=has_free_starts_alone,
+        supports=has_continuous_starts_alone,
         slices=continuous.insertion,
         begin=Begin.ALWAYS,
     ),
     Strategy(
-        name="windows with free starts",
-        supports=has_free_starts_alone,
+        name="windows with continuous starts",
+        supports=has_continuous_starts_alone,
         slices=continuous.windows,
         patience=lambda: TUNING.tries,
     ),
     Strategy(
-        name="windows with free starts and resources",
-        supports=has_free_starts_with_resources,
+        name="windows with continuous starts and resources",
+        supports=has_continuous_starts_with_resources,
         slices=continuous.windows_with_resources,
         patience=lambda: TUNING.tries,
     ),
     Strategy(
         name="multipliers of chains",
-        supports=has_free_starts,
+        supports=has_continuous_starts,
         slices=continuous.chain_multipliers,
         patience=lambda: TUNING.tries,
     ),
@@ -288,12 +288,12 @@ def solved(
     problem: Problem, budget: Budget, seed: int, gap: float, effort: Effort | None = None
 ) -> Solution:
     """Return the best plan and its bound, by all strategies that support the problem."""
-    is_free = has_free_starts(problem)
+    is_agility_only = has_continuous_starts(problem)
     best = Incumbent(
         problem,
         budget,
         gap,
-        bound=quick_bound(problem) if is_free else None,
-        covers_starts=is_free,
+        bound=quick_bound(problem) if is_agility_only else None,
+        covers_starts=is_agility_only,
     )
     return Search(best, seed, STRATEGIES, effort or Effort()).solved()

@@ -31,24 +31,24 @@ def has_half_life(problem: Problem) -> bool:
     return problem.counts_delivery and problem.objective.half_life_s is not None
 
 
-def has_free_starts(problem: Problem) -> bool:
+def has_continuous_starts(problem: Problem) -> bool:
     """Whether collects may start anywhere in their accesses."""
     return problem.pointing is not None
 
 
-def has_free_starts_alone(problem: Problem) -> bool:
+def has_continuous_starts_alone(problem: Problem) -> bool:
     """Whether starts are free, and neither battery nor recorder counts."""
-    return has_free_starts(problem) and not problem.use_resources
+    return has_continuous_starts(problem) and not problem.use_resources
 
 
-def has_free_starts_with_resources(problem: Problem) -> bool:
+def has_continuous_starts_with_resources(problem: Problem) -> bool:
     """Whether starts are free, and battery and recorder count."""
-    return has_free_starts(problem) and problem.use_resources
+    return has_continuous_starts(problem) and problem.use_resources
 
 
 def has_limits(problem: Problem) -> bool:
     """Whether battery, recorder or turns in motion limit plans, with starts of opportunities."""
-    return not has_free_starts(problem) and (problem.use_resources or problem.turns_in_motion)
+    return not has_continuous_starts(problem) and (problem.use_resources or problem.turns_in_motion)
 
 
 def at_rest(problem: Problem) -> Problem:
@@ -62,39 +62,39 @@ def at_rest(problem: Problem) -> Problem:
     )
 
 
-def is_free(problem: Problem) -> bool:
+def is_agility_only(problem: Problem) -> bool:
     """Whether agility alone counts, with starts of opportunities.
 
     Kept tasks need no further care only if precedence is transitive.
     """
-    if problem.use_resources or problem.turns_in_motion or has_free_starts(problem):
+    if problem.use_resources or problem.turns_in_motion or has_continuous_starts(problem):
         return False
     return not problem.pinned.kept or is_transitive(problem)
 
 
-def is_free_satellite(problem: Problem) -> bool:
+def is_agility_only_satellite(problem: Problem) -> bool:
     """Whether agility alone counts, and at most one satellite has opportunities."""
-    return is_free(problem) and not is_shared(problem)
+    return is_agility_only(problem) and not is_shared(problem)
 
 
 def has_choice_of_starts(problem: Problem) -> bool:
     """Whether one satellite with agility alone may start at several times in an access."""
-    return is_free_satellite(problem) and problem.offers_choice
+    return is_agility_only_satellite(problem) and problem.offers_choice
 
 
 def has_one_start_each(problem: Problem) -> bool:
     """Whether one satellite with agility alone may start at one time only in each access."""
-    return is_free_satellite(problem) and not problem.offers_choice
+    return is_agility_only_satellite(problem) and not problem.offers_choice
 
 
-def is_free_fleet(problem: Problem) -> bool:
+def is_agility_only_fleet(problem: Problem) -> bool:
     """Whether agility alone counts, and several satellites have opportunities."""
-    return is_free(problem) and is_shared(problem)
+    return is_agility_only(problem) and is_shared(problem)
 
 
 def is_small_free_fleet(problem: Problem) -> bool:
     """Whether a fleet with agility alone is searched in streams, and ends with cutting planes."""
-    return is_free_fleet(problem) and len(problem.opportunities) <= TUNING.small_fleet
+    return is_agility_only_fleet(problem) and len(problem.opportunities) <= TUNING.small_fleet
 
 
 def is_small_free_fleet_with_choice(problem: Problem) -> bool:
@@ -104,7 +104,7 @@ def is_small_free_fleet_with_choice(problem: Problem) -> bool:
 
 def is_large_free_fleet(problem: Problem) -> bool:
     """Whether a fleet with agility alone is too large for streams and cutting planes."""
-    return is_free_fleet(problem) and not is_small_free_fleet(problem)
+    return is_agility_only_fleet(problem) and not is_small_free_fleet(problem)
 
 
 def has_steady_worth(problem: Problem) -> bool:
@@ -172,8 +172,8 @@ def is_shared_and_aging_in_programs(problem: Problem) -> bool:
 
 def is_within_reach(problem: Problem) -> bool:
     """Whether the whole program is worth trying as the last resort."""
-    if has_free_starts(problem):
+    if has_continuous_starts(problem):
         return False
     if has_half_life(problem):
         return has_limits(problem) and not is_large(problem)
-    return not (is_fleet(problem) if has_limits(problem) else is_free(problem))
+    return not (is_fleet(problem) if has_limits(problem) else is_agility_only(problem))
