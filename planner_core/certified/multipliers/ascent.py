@@ -1,15 +1,15 @@
 """The ascent on the multipliers of targets: one for all kinds of subproblem.
 
-A plan's parts share the targets alone. Each part in turn, in random order, answers the multipliers
-of the moment; after every few answers they move: up where the answers of the moment take a target
-more than once, down where none does. Steps get shorter. The mean of the multipliers settles far
-sooner than they do (an incremental subgradient method, Nedic and Bertsekas 2001); it is the mean
-that is put to all parts at once now and then, which is what proves a bound.
+A plan's parts share only the targets. The parts answer the current multipliers one after another,
+in random order; after every few answers the multipliers move: up for targets that the current
+answers take more than once, down for those that none takes. Steps get shorter. The mean of the
+multipliers settles far sooner than they do (an incremental subgradient method, Nedic and Bertsekas
+2001). Now and then all parts are evaluated at this mean, which proves a bound.
 
-What the parts are, and how one answers, is for an oracle to say: longest paths (``paths``), paths
-that remember targets (``elementary``), batteries (``energy``), recorders (``data``), chains with
-free starts (``chains``). The exact programmes of ``resources`` take seconds for an answer and have
-too few parts for turns: their steps are longer, and follow the value.
+An oracle defines the parts and how each one answers: longest paths (``paths``), paths that remember
+targets (``elementary``), batteries (``energy``), recorders (``data``), chains with free starts
+(``chains``), queues (``queues``). The exact programmes of ``resources`` take seconds for an answer
+and have too few parts for this: they take longer steps, whose length depends on the bound's value.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from planner_core.problem import Bools, Bytes, Floats, Ints
 
 @bundle
 class Epochs(NamedTuple):
-    """In which order parts answer in some epochs, and how far multipliers move in between.
+    """The order in which parts answer in some epochs, and how far multipliers move in between.
 
     Attributes
     ----------
     orders
         Parts, each once in an epoch. Shape ``(num_epochs, num_parts)``.
     moves_after
-        Whether multipliers move after the first, second, ... of them. Shape ``(num_parts,)``.
+        Whether multipliers move after the first, second, ... answer. Shape ``(num_parts,)``.
     lengths
-        What a multiplier moves in each epoch for each answer too many, as a share of what the
-        target is worth. Shape ``(num_epochs,)``.
+        How far one move of each epoch shifts a multiplier for each answer beyond one that takes
+        the target, as a share of the target's best worth. Shape ``(num_epochs,)``.
     most
         The best worth of each target, and zero for contacts. Shape ``(num_targets + 1,)``.
     newest_share
-        Of an epoch's multipliers in the mean.
+        Weight of an epoch's multipliers in the mean.
     """
 
     orders: Ints
@@ -55,14 +55,14 @@ class Epochs(NamedTuple):
 
 @bundle
 class Standing(NamedTuple):
-    """Where an ascent stands; kernels change it in place. Shape ``(num_targets + 1,)`` each.
+    """The state of an ascent; kernels change it in place. Shape ``(num_targets + 1,)`` each.
 
     Attributes
     ----------
     now, mean
-        The multipliers of the moment, and their mean of late.
+        The current multipliers, and their moving mean.
     taken
-        How many of the latest answers take each target.
+        How many of the parts' latest answers take each target.
     """
 
     now: Floats
@@ -71,7 +71,7 @@ class Standing(NamedTuple):
 
 
 class Oracle(Protocol):
-    """What answers multipliers: subproblems that share nothing but the targets.
+    """Solves subproblems that share only the targets, at given multipliers.
 
     Multipliers and counts have an entry for each target and a last one for contacts, which stays
     zero.
@@ -79,24 +79,24 @@ class Oracle(Protocol):
 
     @property
     def parts(self) -> Ints:
-        """The parts that have anything to do."""
+        """The parts that have any tasks."""
 
     def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
-        """Let parts answer anew, and multipliers move in between; return how many epochs ended."""
+        """Let parts answer anew, move multipliers in between; return how many epochs were run."""
 
     def gain(self, multipliers: Floats) -> float:
         """Return the most that all parts can gain at these multipliers."""
 
 
 class OneByOne(ABC):
-    """An oracle whose answers take so long that nothing is lost by asking for each of them."""
+    """An oracle whose answers take so long that calling for each from Python costs nothing."""
 
     @abstractmethod
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
-        """Let a part answer anew, and keep the count of the latest answers."""
+        """Let a part answer anew, and update the count of the latest answers."""
 
     def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
-        """Let parts answer anew, and multipliers move in between; return how many epochs ended."""
+        """Let parts answer anew, move multipliers in between; return how many epochs were run."""
         now, mean, count = standing
         moves_after = epochs.moves_after.tolist()
         for number, order in enumerate(epochs.orders.tolist()):
@@ -118,18 +118,18 @@ class Latest:
         self._taken = [np.empty(0, dtype=np.int32)] * num_parts
 
     def replace(self, part: int, targets: Ints, count: Ints) -> None:
-        """Note another answer of a part, and what that makes of the count of all."""
+        """Replace a part's latest answer, and update the count of all parts."""
         np.subtract.at(count, self._taken[part], 1)
         np.add.at(count, targets, 1)
         self._taken[part] = targets
 
 
 class Part(Protocol):
-    """One satellite's programme."""
+    """One satellite's dynamic programme."""
 
     @property
     def target(self) -> Ints:
-        """The target of each task, one too far for contacts."""
+        """The target of each task; ``num_targets`` for contacts."""
 
 
 P = TypeVar("P", bound=Part)
@@ -145,10 +145,10 @@ class BestPaths(OneByOne, Generic[P]):
 
     @abstractmethod
     def best(self, part: P, multipliers: Floats) -> tuple[float, Ints]:
-        """Return the most that a satellite can gain, and the tasks of a path that does."""
+        """Return the most that a satellite can gain, and the tasks of a path that gains it."""
 
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
-        """Let a satellite answer anew."""
+        """Let a satellite answer anew, and update the count of the latest answers."""
         satellite = self._satellites[part]
         _, path = self.best(satellite, multipliers)
         self._latest.replace(part, satellite.target[path], count)
@@ -165,14 +165,14 @@ class Steps:
     Attributes
     ----------
     first
-        What a multiplier moves in the first epoch, all parts together, for each answer too many;
-        a share of what the target is worth.
+        How far a multiplier moves at the initial step length, over an epoch, for each answer beyond
+        one that takes the target; a share of the target's best worth.
     last
-        How much of that in the last one.
+        Step length after ``num_epochs``, as a share of ``first``.
     num_epochs
-        After how many more are of little use.
+        After how many epochs more are of little use.
     asked_every
-        So many epochs the mean is asked for what it proves.
+        The mean is evaluated for the bound it proves each time so many epochs have passed.
     """
 
     first: float
@@ -182,21 +182,21 @@ class Steps:
 
 
 class Ascent:
-    """Multipliers that get better epoch by epoch; in each every part answers once.
+    """Multipliers that get better epoch by epoch; in each epoch every part answers once.
 
-    The same for the same seed, however many epochs are asked for at a time.
+    The result depends on the seed, not on how many epochs are asked for at a time.
 
     Parameters
     ----------
     most
         The best worth of each target. Shape ``(num_targets,)``.
     begin
-        The multipliers at first. Shape ``(num_targets,)``.
+        The initial multipliers. Shape ``(num_targets,)``.
 
     Attributes
     ----------
     value, multipliers
-        The least bound that was proven so far, and what proves it. Shape ``(num_targets,)``.
+        The lowest bound proven so far, and the multipliers that prove it. Shape ``(num_targets,)``.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class Ascent:
         self._standing = Standing(now, now.copy(), np.zeros(len(now), dtype=np.int32))
         self._rng = np.random.default_rng(seed)
         self._epoch = 0
-        # Each target for its whole worth, and nothing for any task.
+        # With multipliers of their best worth, targets leave nothing for any task to earn.
         self.value, self.multipliers = float(most.sum()), most
 
     @property
@@ -218,12 +218,12 @@ class Ascent:
 
     @property
     def mean(self) -> Floats:
-        """The mean of the multipliers of late. Shape ``(num_targets,)``."""
+        """The moving mean of the multipliers. Shape ``(num_targets,)``."""
         mean: Floats = self._standing.mean[:-1]
         return mean
 
     def improve(self, num_epochs: int, stop: Bytes) -> None:
-        """Let all parts answer so many times, and prove a bound now and then."""
+        """Run so many epochs, and evaluate the mean every ``asked_every`` epochs."""
         every, last = self._steps.asked_every, self._epoch + num_epochs
         while self._epoch < last:
             num_next = min(last - self._epoch, every - self._epoch % every)
@@ -245,7 +245,7 @@ class Ascent:
         moves_after[len(parts) * np.arange(1, num_moves + 1) // max(1, num_moves) - 1] = True
         numbers = range(self._epoch, self._epoch + num_epochs)
         shorter = [steps.last ** (number / max(1, steps.num_epochs)) for number in numbers]
-        # Before all have answered nothing is known of what is taken twice.
+        # Until all parts have answered once it is unknown which targets are taken twice.
         first = [steps.first if number else 0.0 for number in numbers]
         return Epochs(
             orders=np.array([self._rng.permutation(parts) for _ in numbers]),
@@ -256,7 +256,7 @@ class Ascent:
         )
 
     def ask(self) -> None:
-        """Note what the mean of the multipliers proves."""
+        """Evaluate the bound that the mean of the multipliers proves; keep the lowest."""
         mean = self._standing.mean
         value = float(mean.sum()) + self._oracle.gain(mean)
         if value < self.value:
@@ -273,7 +273,7 @@ def weigh(
     weight: Floats,
     is_on_path: Bools,
 ) -> None:
-    """Weigh a part's nodes at the multipliers of the moment, and take its path off the count."""
+    """Weigh a part's nodes at the current multipliers, and take its last path off the count."""
     for a in range(begin, end):
         weight[a] = max(0.0, worth[a] - standing.now[site[a]])
         if is_on_path[a]:
@@ -283,9 +283,9 @@ def weigh(
 
 @inlined
 def move(standing: Standing, epochs: Epochs, number: int, i: int) -> None:
-    """Move multipliers where they do after the i-th answer, and take an epoch's last to the mean.
+    """Move multipliers if they move after the i-th answer; update the mean at an epoch's end.
 
-    Each stays within 0 and the best worth of its target.
+    Each multiplier stays between 0 and the best worth of its target.
     """
     length, most, now, taken = epochs.lengths[number], epochs.most, standing.now, standing.taken
     if epochs.moves_after[i]:

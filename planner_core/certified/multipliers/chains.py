@@ -20,7 +20,7 @@ from planner_core.problem import Bytes, Floats, Ints, Problem
 
 
 class Chains(OneByOne):
-    """The heaviest chain of each part of a day, at given multipliers."""
+    """The heaviest chain of each piece of a satellite's day, at given multipliers."""
 
     def __init__(self, dual: ContinuousDual) -> None:
         self._dual = dual
@@ -28,18 +28,18 @@ class Chains(OneByOne):
         self._latest = Latest(len(dual.parts))
 
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
-        """Give a part a new chain."""
+        """Find a part's new chain, and update the count of the latest ones."""
         _, taken = self._dual.chain(part, multipliers[:-1], is_exact=False)
         self._latest.replace(part, taken, count)
 
     def gain(self, multipliers: Floats) -> float:
-        """Return what no chains of all parts exceed."""
+        """Return an upper bound on the worth of all parts' chains together."""
         value, _ = self._dual.at(multipliers[:-1])
         return value - float(multipliers.sum())
 
 
 def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats] | None]:
-    """Yield the best bound so far and its multipliers, or None after an epoch that proves none."""
+    """Yield a stage's best bound and its multipliers, or None after an epoch that proves none."""
     width_s = width_for(problem)
     if num_followers(problem, width_s) > MAX_FOLLOWERS:
         return
@@ -56,7 +56,7 @@ def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Flo
         num_epochs=TUNING.epochs // TUNING.several,
         asked_every=TUNING.epochs_at_a_time,
     )
-    # An epoch of narrow cells takes as long as four of wide ones, which prove less.
+    # An epoch with narrow cells takes as long as four with wide ones, which prove less.
     stages = [(rough_cell_s(), wide), (width_s, narrow)]
     if width_s >= rough_cell_s():
         stages = [(width_s, wide)]

@@ -1,7 +1,7 @@
-"""Satellites limited by their recorders, as an oracle, where images on board earn a share.
+"""Satellites limited by their recorders, as an oracle, if images on board earn a share.
 
-Batteries are left out, which makes an answer so quick that hundreds of epochs can be had. What the
-multipliers prove is for ``resource_bound`` to say.
+Batteries are left out, which makes answers so quick that there is time for hundreds of epochs. With
+batteries as well, ``resource_bound`` evaluates what the multipliers prove.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from planner_core.problem import COLLECT, Floats, Ints, Problem, SatelliteProble
 
 
 class _Part(NamedTuple):
-    """One satellite's programme; ``target`` is one too far for contacts."""
+    """One satellite's dynamic programme; ``target`` is ``num_targets`` for contacts."""
 
     rows: Ints
     network: Network
@@ -47,12 +47,12 @@ class _Part(NamedTuple):
 
 
 class DataPaths(BestPaths[_Part]):
-    """The best path of each satellite that its recorder allows, at given multipliers."""
+    """Each satellite's best path that its recorder allows, at given multipliers."""
 
     def __init__(self, worth: Floats, satellites: list[_Part]) -> None:
         super().__init__(satellites)
         self._worth = worth
-        # Satellites answer one after another, in the same room.
+        # Satellites answer one after another, and share these tables.
         shape = (
             max((len(part.rows) for part in satellites), default=0),
             max((part.levels.num_levels for part in satellites), default=0),
@@ -61,7 +61,7 @@ class DataPaths(BestPaths[_Part]):
 
     @classmethod
     def of(cls, problem: Problem) -> DataPaths | None:
-        """Return the oracle; None where no image on board earns a share, or tables are large."""
+        """Return the oracle; None if no image on board earns a share or tables are too large."""
         satellites = [_Part.of(problem, s) for s in problem.satellites if len(s)]
         num_cells = sum(len(part.rows) * part.levels.num_levels for part in satellites)
         if num_cells > MAX_DATA_CELLS or all(part.shares is None for part in satellites):
@@ -69,7 +69,7 @@ class DataPaths(BestPaths[_Part]):
         return cls(problem.worth, satellites)
 
     def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
-        """Return the most that a satellite can gain, and the tasks of a path that does."""
+        """Return the most that a satellite can gain, and the tasks of a path that gains it."""
         worth = self._worth[part.rows] - multipliers[part.target]
         weight = np.maximum(worth, 0.0)
         if part.shares is not None:

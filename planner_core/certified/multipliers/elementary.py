@@ -1,4 +1,4 @@
-"""Longest paths that are paid for a target once in a pass over it, as an oracle."""
+"""Longest paths that are paid for a target only once in each pass over it, as an oracle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from planner_core.worth import weights
 
 
 class ElementaryPaths:
-    """The best path of each part at given multipliers, with no target paid twice in a pass."""
+    """Each part's best path at given multipliers, with no target paid twice in a pass."""
 
     def __init__(self, problem: Problem, network: ArcNetwork, memory: Memory) -> None:
         n = len(network.row)
@@ -34,7 +34,7 @@ class ElementaryPaths:
         self._count = np.zeros(len(problem.target_ids) + 1, dtype=np.int32)
 
     def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
-        """Give parts new paths, and let multipliers move in between."""
+        """Give parts new paths, move multipliers in between; return how many epochs were run."""
         return int(
             _run(
                 self._network, self._memory, self._labels, epochs, standing, self._worth,
@@ -43,7 +43,7 @@ class ElementaryPaths:
         )  # fmt: skip
 
     def gain(self, multipliers: Floats) -> float:
-        """Return what no paths of all parts exceed."""
+        """Return an upper bound on the worth of all parts' paths together."""
         weight = weights(self._worth, multipliers[self._network.site])
         return float(
             elementary_paths(self._network, self._memory, weight, self._labels, self._count)
@@ -51,12 +51,12 @@ class ElementaryPaths:
 
 
 def ascent_on_passes(problem: Problem, seed: int, num_epochs: int | None = None) -> Ascent:
-    """Return the ascent on what such paths prove.
+    """Return the ascent on the bound that such paths prove.
 
     Parameters
     ----------
     num_epochs
-        How many there will be, where they are few: steps get shorter the sooner.
+        How many epochs there will be, if few: steps then get shorter sooner.
     """
     network = arc_network_of(problem)
     oracle = ElementaryPaths(problem, network, memory_of(problem, network))
@@ -80,7 +80,7 @@ def _run(
     is_on_path: Bools,
     stop: Bytes,
 ) -> int:
-    """Give each part a new path in each epoch, and move multipliers in between, all in place."""
+    """Give each part a new path in each epoch, move multipliers in between; all in place."""
     for number in range(len(epochs.orders)):
         for i in range(len(epochs.moves_after)):
             if stop[0]:

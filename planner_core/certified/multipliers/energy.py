@@ -1,8 +1,8 @@
 """Satellites limited by their batteries, as an oracle.
 
-Recorders are left out, which makes an answer so quick that hundreds of epochs can be had. With
-turns to the sun answers are estimates, not bounds. What the multipliers prove is for
-``resource_bound`` to say.
+Recorders are left out, which makes answers so quick that there is time for hundreds of epochs. With
+turns to the sun answers are estimates, not bounds. ``resource_bound`` evaluates what the
+multipliers prove.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from planner_core.worth import weights
 
 
 class _Part(NamedTuple):
-    """One satellite's programme; ``target`` is one too far for contacts."""
+    """One satellite's dynamic programme; ``target`` is ``num_targets`` for contacts."""
 
     rows: Ints
     network: Network
@@ -39,17 +39,17 @@ class _Part(NamedTuple):
 
 
 class EnergyPaths(BestPaths[_Part]):
-    """The best path of each satellite that its battery allows, at given multipliers.
+    """Each satellite's best path that its battery allows, at given multipliers.
 
     Attributes
     ----------
     usage
-        How many of the answers since it was last cleared took each opportunity. Shape ``(n,)``.
+        How many answers took each opportunity since this was last cleared. Shape ``(n,)``.
     """
 
     def __init__(self, problem: Problem) -> None:
         super().__init__([_Part.of(problem, s) for s in problem.satellites if len(s)])
-        # Satellites answer one after another, in the same room.
+        # Satellites answer one after another, and share these tables.
         most_rows = max((len(part.target) for part in self._satellites), default=0)
         widest = max((part.levels.width for part in self._satellites), default=0)
         self._own = np.empty((most_rows, widest))
@@ -58,25 +58,25 @@ class EnergyPaths(BestPaths[_Part]):
         self.usage = np.zeros(len(problem.opportunities))
 
     def answer(self, part: int, multipliers: Floats, count: Ints) -> None:
-        """Let a satellite answer anew."""
+        """Let a satellite answer anew, and update the counts."""
         satellite = self._satellites[part]
         _, path = self.best(satellite, multipliers)
         self._latest.replace(part, satellite.target[path], count)
         self.usage[satellite.rows[path]] += 1.0
 
     def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
-        """Return the most that a satellite can gain, and the tasks of a path that does."""
+        """Return the most that a satellite can gain, and the tasks of a path that gains it."""
         worth, paid = self._worth[part.rows], multipliers[part.target]
         gain, path = most_by_energy(
             part.network, part.levels, weights(worth, paid), self._own, self._num_own
         )
-        # What is worth less than its multiplier is only passed through.
+        # A path only passes through tasks that are worth less than their multipliers.
         return gain, path[worth[path] >= paid[path]]
 
 
 def ascent_on_energy(
     problem: Problem, oracle: EnergyPaths, begin: Floats, num_epochs: int, seed: int
 ) -> Ascent:
-    """Return the ascent on what batteries prove."""
+    """Return the ascent on the bound that batteries prove."""
     steps = Steps(first=TUNING.first_step, last=TUNING.last_step, num_epochs=max(1, num_epochs))
     return Ascent(oracle, problem.best_worth, begin, steps, seed)

@@ -1,9 +1,9 @@
-"""The ascent on multipliers of contacts, where images are worth less the later they come down.
+"""The ascent on multipliers of contacts, if images are worth less the later they come down.
 
-Contacts are few, an answer takes hundredths of a second, and what the best plans take of contacts
-is what the search for plans wants to know. So every satellite answers in each round, and the
-multipliers of targets and contacts move together, by what the bound is above the best plan
-(Polyak's step), shorter once the bound no longer falls.
+Contacts are few, an answer takes hundredths of a second, and the search for plans needs to know
+which contacts the relaxed plans take. So every satellite answers in each round, and multipliers of
+targets and contacts move together, in proportion to the gap between bound and best plan (Polyak's
+step); steps get shorter once the bound no longer falls.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ class LatencyAscent:
     Parameters
     ----------
     begin
-        The multipliers of targets at first, unless none at all prove more: where energy is short,
-        few targets are taken twice. Shape ``(num_targets,)``.
+        The initial multipliers of targets, unless multipliers of zero prove a lower bound: if
+        energy is short, few targets are taken twice. Shape ``(num_targets,)``.
 
     Attributes
     ----------
     value
-        The least that was come to, an estimate where satellites turn to the sun.
+        The lowest value so far; an estimate if satellites turn to the sun.
     contact_sets
-        The contacts of each answer, rows ascending, the latest last, each set once.
+        The contacts of each round's answers, rows ascending; each set once, the latest last.
     """
 
     def __init__(self, problem: Problem, begin: Floats) -> None:
@@ -45,7 +45,7 @@ class LatencyAscent:
         self._most = np.append(problem.best_worth, 0.0)
         self._is_contact = problem.opportunities.kind == CONTACT
         self._multipliers = np.zeros(len(begin) + 1)
-        # By typical image, as targets are; contacts of the table, others none.
+        # Of each opportunity, for a typical image's data; 0 for collects.
         self._tolls = np.zeros(len(problem.opportunities))
         self._groups = antenna_groups(problem)
         self._antenna = np.zeros(len(self._groups))
@@ -66,7 +66,7 @@ class LatencyAscent:
         return self._length < TUNING.little
 
     def improve(self, num_rounds: int, level: float, stop: Bytes) -> None:
-        """Go some rounds on towards a bound at ``level``, which a known plan earns."""
+        """Run some rounds towards a bound of ``level``, which a known plan earns."""
         for _ in range(num_rounds):
             if stop[0] or self.is_settled or self.value <= level:
                 return
@@ -90,15 +90,15 @@ class LatencyAscent:
 
     @property
     def antenna_multipliers(self) -> Floats | None:
-        """The best multipliers of antennas, None where there are none. Shape ``(num_groups,)``."""
+        """The best multipliers of antennas; None if all are 0. Shape ``(num_groups,)``."""
         _, _, antenna = self._best
         return antenna if antenna.any() else None
 
     def bound(self, *, is_last: bool = True) -> Bound:
-        """Return the least that was proven so far.
+        """Return the lowest bound proven so far.
 
-        With turns to the sun a proof takes as long as several rounds. Unless it is the last word
-        it waits until the estimate is lower by as much as makes a step worth while.
+        With turns to the sun a proof takes as long as several rounds. Unless ``is_last``, it is
+        made only once the estimate has fallen by ``TUNING.worth_a_step``.
         """
         step = 0.0 if is_last else TUNING.worth_a_step * self._at_proof
         if self.value < self._at_proof - step:
@@ -121,7 +121,7 @@ class LatencyAscent:
         return self._proven
 
     def _value(self, multipliers: Floats) -> float:
-        """Return what multipliers of targets prove alone."""
+        """Return the value at these multipliers of targets, without those of contacts."""
         value = float(multipliers.sum())
         for one in self._satellites:
             free = np.zeros(len(one.contacts))
@@ -156,7 +156,7 @@ class LatencyAscent:
             self._move(value - level, too_many, too_much, self._images_per_contact * excess)
 
     def _is_hopeful(self, value: float) -> bool:
-        """Note what the multipliers of the moment prove; go back to better ones after a while."""
+        """Note the current value; return False if it leads back to the best multipliers."""
         if value < self.value * (1.0 - SAME):
             self._best, self._num_idle = (self._multipliers, self._tolls, self._antenna), 0
             self.value = value
@@ -169,7 +169,7 @@ class LatencyAscent:
         return False
 
     def _move(self, above: float, too_many: Floats, too_much: Floats, excess: Floats) -> None:
-        """Move all multipliers against what the answers take too much of.
+        """Raise multipliers of what the answers take too much of, and lower the others.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ from planner_core.problem import Bools, Bytes, Floats, Ints, Problem
 
 
 class Paths:
-    """The longest path of each part of a network at given multipliers."""
+    """Each part's longest path through a network at given multipliers."""
 
     def __init__(self, problem: Problem, network: Network) -> None:
         n = len(network.row)
@@ -24,7 +24,7 @@ class Paths:
         self._is_on_path = np.zeros(n, dtype=np.bool_)
 
     def run(self, epochs: Epochs, standing: Standing, stop: Bytes) -> int:
-        """Give parts new paths, and let multipliers move in between."""
+        """Give parts new paths, move multipliers in between; return how many epochs were run."""
         return int(
             _run(
                 self._network, epochs, standing, self._worth, self._is_on_path,
@@ -33,7 +33,7 @@ class Paths:
         )  # fmt: skip
 
     def gain(self, multipliers: Floats) -> float:
-        """Return what the longest paths of all parts are worth."""
+        """Return what the longest paths of all parts are worth together."""
         np.take(multipliers, self._network.site, out=self._weight)
         np.maximum(self._worth - self._weight, 0.0, out=self._weight)
         return float(
@@ -42,7 +42,7 @@ class Paths:
 
 
 def ascent_on_paths(problem: Problem, network: Network, num_epochs: int, seed: int) -> Ascent:
-    """Return the ascent on what longest paths prove."""
+    """Return the ascent on the bound that longest paths prove."""
     steps = Steps(first=TUNING.first_step_of_paths, last=TUNING.last_step, num_epochs=num_epochs)
     begin = TUNING.begin * problem.best_worth
     return Ascent(Paths(problem, network), problem.best_worth, begin, steps, seed)
@@ -60,14 +60,14 @@ def _run(
     previous: Ints,
     stop: Bytes,
 ) -> int:
-    """Give each part a new path in each epoch, and move multipliers in between, all in place.
+    """Give each part a new path in each epoch, move multipliers in between; all in place.
 
     Parameters
     ----------
     is_on_path
-        Which nodes are on the current paths.
+        Which nodes the current paths are paid for. Shape ``(n,)``.
     weight, value, previous
-        Room to work in. Shape ``(n,)``.
+        Workspace. Shape ``(n,)``.
     """
     for number in range(len(epochs.orders)):
         for i in range(len(epochs.moves_after)):
@@ -78,7 +78,7 @@ def _run(
             weigh(begin, end, network.site, worth, standing, weight, is_on_path)
             _, at = heaviest_path(network, part, weight, value, previous)
             while at >= 0:
-                # What is worth nothing is only passed through.
+                # A path only passes through nodes that are worth nothing.
                 if weight[at] > 0.0:
                     is_on_path[at] = True
                     standing.taken[network.site[at]] += 1

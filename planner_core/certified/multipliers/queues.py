@@ -1,8 +1,8 @@
-"""Satellites whose contacts are settled, with what waits for each, as an oracle.
+"""Satellites whose contacts are settled, with the data that waits for each, as an oracle.
 
-To answer with all contacts takes the programme over queues seconds; with those of a good plan, few
-levels of energy and whole images of data a tenth of one. The multipliers that this leads to prove
-nearly as much for all contacts, and plans at these take few targets twice.
+With all contacts an answer of the programme over queues takes seconds; with only those of a good
+plan, few levels of energy and whole images of data it takes a tenth of a second. The resulting
+multipliers prove nearly as much for all contacts, and plans at them take few targets twice.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from planner_core.problem.restrict import taking
 
 
 class _Part(NamedTuple):
-    """One satellite's programme, and the targets of its rows; contacts have one too far."""
+    """One satellite's programme, and its rows' targets (``num_targets`` for contacts)."""
 
     queues: Queues
     target: Ints
@@ -50,14 +50,14 @@ class _Part(NamedTuple):
 
 
 class QueuePaths(BestPaths[_Part]):
-    """The best path of each satellite that takes given contacts, at given multipliers."""
+    """Each satellite's best path that takes given contacts, at given multipliers."""
 
     def __init__(self, parts: Sequence[_Part], stop: Bytes) -> None:
         super().__init__(parts)
         self._stop = stop
 
     def best(self, part: _Part, multipliers: Floats) -> tuple[float, Ints]:
-        """Return the most that a satellite can gain, and the tasks of a path that does."""
+        """Return the most that a satellite can gain, and the tasks of a path that gains it."""
         return most_by_queues(part.queues._replace(multiplier=multipliers[part.target]), self._stop)
 
 
@@ -66,14 +66,14 @@ def multipliers_by_queues(
 ) -> Floats:
     """Return multipliers of targets that suit plans with these contacts.
 
-    Those at first where the programmes would take too long. On the paper's satellite with 1,000
-    targets and a half-life of 12 h ten epochs take one CPU second, plans are worth 237.4 in place
-    of 237.2, and the bound with all contacts is 0.05 lower.
+    Returns the initial ones if the programmes would take too long or ``stop`` is set. On the
+    paper's satellite with 1,000 targets and a half-life of 12 h ten epochs take one CPU second,
+    plans are worth 237.4 instead of 237.2, and the bound with all contacts is 0.05 lower.
 
     Parameters
     ----------
     begin
-        The multipliers at first. Shape ``(num_targets,)``.
+        The initial multipliers. Shape ``(num_targets,)``.
     """
     part = taking(problem, contacts)
     is_open = problem.opportunities.kind == COLLECT
@@ -82,7 +82,7 @@ def multipliers_by_queues(
     known = [one for one in parts if one is not None]
     if len(known) < len(parts):
         return begin
-    # From good multipliers long steps lead away.
+    # Long steps would lead away from good multipliers.
     steps = Steps(
         first=TUNING.little,
         last=TUNING.last_step_of_few,

@@ -1,4 +1,4 @@
-"""Multipliers for the bound by dynamic programmes: a subgradient ascent on the exact one."""
+"""Multipliers for the bound by exact dynamic programmes: a subgradient ascent on it."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from planner_core.problem.plan import Plan
 
 
 class ResourceAscent:
-    """Multipliers that bring the bound down, and what the relaxed plans on the way looked like.
+    """Multipliers that bring the bound down, and statistics of the relaxed plans on the way.
 
     Attributes
     ----------
     satellites
-        The programme of each satellite that has anything to do.
+        The programme of each satellite that has opportunities.
     value, multipliers, antenna_multipliers, unit
         The best bound and what proves it.
     usage
         How many relaxed plans took each opportunity. Shape ``(n,)``.
     contact_sets
-        How often each set of contacts was best.
+        How many relaxed plans took exactly each set of contacts.
     theta
-        Length of the steps; they get shorter as they stop helping.
+        Factor of the step length; it falls when steps no longer help.
     wants_antennas
         Whether a relaxed plan has taken more contacts at a time than a station can serve.
     """
@@ -48,24 +48,23 @@ class ResourceAscent:
     def __init__(self, problem: Problem, value: float, multipliers: Floats, stop: Bytes) -> None:
         self._problem, self._stop = problem, stop
         self._typical = problem.typical_worth
-        # By target: what the image earns that plans take of it, as far as they are known.
+        # By target: what the image of it earns that a known or relaxed plan last took.
         self._worth_taken = problem.best_worth.copy()
         self._num_satellites = sum(len(satellite) > 0 for satellite in problem.satellites)
         self._num_images = int(value / self._typical / self._num_satellites)
-        # Two levels to an image cost a bound an image where all must come down: 281 and 283 in
-        # place of 280 and 282 (delivered-paper-500). With rewards of 1 to 10, 1,000 targets, more
-        # levels slow the search: 1.4 and 1.3 % after 20 CPU seconds, with two 1.1 and 0.5. A fleet
-        # asks for more at last alone (``count_finely``), for the room that they take.
+        # Two levels to an image cost a bound an image if all must come down: 281 and 283 instead
+        # of 280 and 282 (delivered-paper-500). With rewards of 1 to 10, 1,000 targets, more levels
+        # slow the search: 1.4 and 1.3 % after 20 CPU seconds, with two 1.1 and 0.5. A fleet uses
+        # more only at the end (``count_finely``), because of the memory that they take.
         is_alone = self._num_satellites == 1
         comes_down = is_alone and problem.counts_delivery
         self.satellites = self._relaxations(TUNING.several if comes_down else TUNING.coarse)
-        # Multipliers are the multipliers of targets, then those of groups of contacts.
+        # Vectors have an entry for each target, then one for each group of contacts.
         self._groups = antenna_groups(problem)
         num_groups = len(self._groups)
         self._is_reachable = np.diff(problem.target_opportunities[1]) > 0
         self._is_moved = np.append(self._is_reachable, np.zeros(num_groups, dtype=np.bool_))
-        # No contact brings more down than all targets are worth: a multiplier above that says no
-        # more.
+        # No contact brings down more than all targets are worth: a higher multiplier adds nothing.
         all_worth = float(problem.best_worth.sum())
         self._most = np.append(problem.best_worth, np.full(num_groups, all_worth))
         own_scale = np.where(problem.best_worth > 0.0, problem.best_worth, 1.0)
@@ -73,8 +72,7 @@ class ResourceAscent:
         self.antenna_multipliers = np.zeros(num_groups)
         self.value, self.theta, self._stalled = np.inf, 1.0, 0
         self._now = self._direction = np.zeros_like(self._scale)
-        # Rows of relaxed plans of each satellite: at any multipliers the best is no worse than
-        # they.
+        # Rows of each satellite's relaxed plans: at any multipliers its best is no worse than they.
         self._paths: list[list[Ints]] = [[] for _ in self.satellites]
         self.unit = self._unit(value)
         self.usage = np.zeros(len(problem.opportunities))
@@ -87,12 +85,12 @@ class ResourceAscent:
         return tuple(one.with_data_multiplier(self._num_images) for one in every)
 
     def _scale_of_antennas(self) -> Floats:
-        """Return how far multipliers of antennas go where those of typical targets go their worth.
+        """Return the scale of antennas' steps, as the worth of a target is the scale of its own.
 
-        A contact brings down many images, and how many is what its multiplier comes to. Of four
-        satellites and two stations 887 images come to 865 in 40 steps so, to 877 where each group
-        goes by its own contacts, and to 870 where groups go a twentieth as far. Shape
-        ``(num_groups,)``.
+        A contact brings down many images, so its multiplier amounts to the worth of many. With four
+        satellites and two stations a bound of 887 images falls to 865 in 40 steps this way, to 877
+        if each group is scaled by its own contacts, and to 870 if groups move a twentieth as far.
+        Shape ``(num_groups,)``.
         """
         volumes = []
         for relaxation in self.satellites:
@@ -111,12 +109,12 @@ class ResourceAscent:
         return float(unit)
 
     def step(self, level: float) -> bool:
-        """Evaluate the current multipliers and step on; return False once the work must stop.
+        """Evaluate the current multipliers and step on; return False if there is no next step.
 
         Parameters
         ----------
         level
-            Where the best multipliers are expected.
+            The bound that the best multipliers are expected to prove.
         """
         now = self._now
         multipliers, antenna_multipliers = self._whole(now, self.unit)
@@ -162,16 +160,17 @@ class ResourceAscent:
     def count_in(self, unit: float, *, moves_antennas: bool) -> None:
         """Continue in other units of worth; let the multipliers of antennas move, or hold them.
 
-        If they move, those of targets hardly do: an antenna weighs as much as all its downlinks.
+        If they move, those of targets hardly do: an antenna's steps are scaled by the many images
+        that its contacts bring down.
         """
         self.unit = unit
         self._is_moved[len(self._is_reachable) :] = moves_antennas
         self.restart(self.multipliers)
 
     def count_finely(self, plan: Plan) -> None:
-        """Go on with more levels of the recorder, from a plan that is known."""
+        """Go on with more levels of the recorder, from a known plan."""
         self.satellites = self._relaxations(TUNING.fine)
-        # Of the paths so far some are none with these.
+        # With these levels some of the paths so far are infeasible.
         self._paths = [[] for _ in self.satellites]
         self.learn(plan)
         self._return_to_the_best()
@@ -190,7 +189,7 @@ class ResourceAscent:
         return taken
 
     def learn(self, plan: Plan) -> None:
-        """Note a plan that is known."""
+        """Add a known plan to the relaxed plans."""
         taken = np.zeros(len(self._problem.opportunities), dtype=np.bool_)
         taken[[action.opportunity for action in plan.actions]] = True
         for relaxation, paths in zip(self.satellites, self._paths, strict=True):
@@ -198,9 +197,9 @@ class ResourceAscent:
         self._note_images(np.flatnonzero(taken))
 
     def restart(self, multipliers: Floats, antenna_multipliers: Floats | None = None) -> None:
-        """Go on from other multipliers of targets, and of antennas, in shorter steps.
+        """Go on from other multipliers of targets, and of antennas, in steps of full length.
 
-        Multipliers of antennas are the best so far by default.
+        Multipliers of antennas stay the best so far by default. The best value is forgotten.
         """
         if antenna_multipliers is not None:
             self.antenna_multipliers = antenna_multipliers
@@ -213,19 +212,19 @@ class ResourceAscent:
         self._direction = np.zeros_like(self._now)
 
     def _whole(self, multipliers: Floats, unit: float) -> tuple[Floats, Floats]:
-        """Return multipliers, antennas' too, at which the images taken are worth whole units."""
+        """Return multipliers, also of antennas, at which images taken are worth whole units."""
         multipliers, antenna_multipliers = np.split(multipliers, [len(self._is_reachable)])
         whole = leaving_whole_units(self._problem, multipliers, unit, self._worth_taken)
         whole[~self._is_reachable] = 0.0
         return whole, unit * np.round(antenna_multipliers / unit)
 
     def _note_images(self, rows: npt.NDArray[np.integer]) -> None:
-        """Note what the images among these opportunities earn, as what plans take."""
+        """Note what the images among these opportunities earn, as those that plans take."""
         images = rows[self._problem.opportunities.kind[rows] == COLLECT]
         self._worth_taken[self._problem.opportunities.site[images]] = self._problem.worth[images]
 
     def _known(self, i: int, worth: Ints) -> int | None:
-        """Return what a satellite gains on one of the paths that are known, if there are any."""
+        """Return the most that a satellite gains on a known path; None if none is known."""
         weight = worth[self.satellites[i].satellite.rows]
         gains = (max(0, int(weight[path].sum())) for path in self._paths[i])
         return max(gains, default=None)
@@ -233,9 +232,10 @@ class ResourceAscent:
     def _evaluate(
         self, multipliers: Floats, antenna_multipliers: Floats
     ) -> tuple[float, Floats] | None:
-        """Return the bound of these multipliers, and what its paths take too often.
+        """Return the bound at these multipliers, and how often too many its paths take each target.
 
-        Shape ``(num_targets + num_groups,)``.
+        After the targets come the groups of contacts; None once stopped. Shape
+        ``(num_targets + num_groups,)``.
         """
         problem = self._problem
         worth = whole_worth(problem, multipliers, self.unit, antenna_multipliers)
