@@ -1,10 +1,10 @@
 """One driver for all problems: the strategy that gained most goes on.
 
-A strategy betters the plan or lowers the bound, a slice of work at a time. What a slice gains is
-by how much plan and bound have come nearer to each other. The next one goes to the strategy whose
-latest gained most, so that the work goes where it pays: to the bound where that is what is far
-off, to the plan where that is. Slices take about as long as each other. They are not timed, so that
-the same seed gives the same plan (docs/decisions/0012-one-driver.md).
+A strategy improves the plan or lowers the bound, one slice of work at a time. The gain of a slice
+is how much it narrows the distance between plan and bound. The next slice goes to the strategy
+whose latest slice gained most, so that work goes to whichever of bound and plan is further off.
+All slices take about the same time. They are not timed, so that the same seed gives the same plan
+(docs/decisions/0012-one-driver.md).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Begin(Enum):
     """When a strategy has its first slice."""
 
     ALWAYS = auto()
-    """At once, whatever the time: what an answer cannot do without."""
+    """At once, even if the budget is spent: no answer can do without it."""
     NEXT = auto()
     """Once those listed before it have begun."""
     STALLED = auto()
@@ -37,7 +37,7 @@ class Begin(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effort:
-    """How much is done before HiGHS is asked for the rest.
+    """How much is done before HiGHS is called for the rest.
 
     Attributes
     ----------
@@ -56,19 +56,18 @@ Slices: TypeAlias = Callable[["Search"], Iterator[None]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strategy:
-    """One way to better the plan or to lower the bound.
+    """One way to improve the plan or to lower the bound.
 
     Attributes
     ----------
     supports
-        Which problems it is for.
+        Whether it is for a problem.
     slices
-        Does the work, and yields after each slice; it ends where more would be of no use.
+        Does the work, and yields after each slice; ends when more work would be of no use.
     begin
         When it has its first slice.
     patience
-        After how many slices in a row without a gain it is stalled; None where it sees that itself,
-        and ends.
+        After how many slices in a row without a gain it is stalled; None if it ends by itself.
     """
 
     name: str
@@ -79,7 +78,7 @@ class Strategy:
 
 
 class Engine(Protocol):
-    """What strategies work with: a state of its own about one incumbent."""
+    """State about one incumbent, which strategies share."""
 
     def __init__(self, best: Incumbent, seed: int) -> None: ...
 
@@ -94,11 +93,11 @@ class Search:
     Attributes
     ----------
     like
-        The problem whose strategies are asked; the one that is planned by default.
+        The problem that strategies must support; by default the one that is planned.
     num_idle
         How many slices in a row have gained nothing.
     proof
-        Returns the bound with all that proves it, where that is gathered at the end.
+        Returns the bound with its whole proof, if that is put together only at the end.
     """
 
     best: Incumbent
@@ -112,12 +111,12 @@ class Search:
 
     @property
     def problem(self) -> Problem:
-        """What is planned."""
+        """The problem that is planned."""
         return self.best.problem
 
     @property
     def budget(self) -> Budget:
-        """What may be spent."""
+        """The time that may be spent."""
         return self.best.budget
 
     def engine(self, kind: type[E]) -> E:
@@ -135,7 +134,7 @@ class Search:
         without: Slices | None = None,
         only: Sequence[Slices] | None = None,
     ) -> Search:
-        """Return a search for another problem, with all strategies but one, or with a few."""
+        """Return a search about another incumbent, with all strategies but one, or with a few."""
         strategies = [
             one
             for one in self.strategies
@@ -145,11 +144,11 @@ class Search:
 
     @property
     def is_promising(self) -> bool:
-        """Whether any strategy has gained anything of late."""
+        """Whether any strategy has gained anything recently."""
         return self.num_idle < TUNING.rounds
 
     def solved(self) -> Solution:
-        """Search until plan and bound are close enough, or no strategy gets any further."""
+        """Search until plan and bound are close enough, the budget is spent or strategies end."""
         for _ in close_in(self):
             pass
         return self.best.solution(self.proof() if self.proof else None)
@@ -167,7 +166,7 @@ class ActiveStrategy:
 
     @property
     def is_stalled(self) -> bool:
-        """Whether its slices have not gained anything of late."""
+        """Whether its latest slices have gained nothing."""
         return self._patience is not None and self.num_idle >= self._patience()
 
     def go_on(self) -> None:
@@ -180,10 +179,10 @@ class ActiveStrategy:
 
 
 def close_in(search: Search) -> Iterator[None]:
-    """Let the strategies close in on the best plan and its bound, each slice by the latest gains.
+    """Run slices of the strategies until plan and bound meet, each chosen by the latest gains.
 
-    None waits for more than a few slices of others. It stops after each: a search beside another is
-    a strategy of that one, and each of its slices is one there.
+    No strategy waits for more than a few slices of others. Yields after each slice: a search beside
+    another is a strategy of that one, and each of its slices counts as one there.
     """
     like = search.problem if search.like is None else search.like
     left = [one for one in search.strategies if one.supports(like)]
@@ -211,10 +210,10 @@ def close_in(search: Search) -> Iterator[None]:
 
 
 def slices_beyond_the_first_plan(search: Search) -> Iterator[None]:
-    """Close in; stop after each slice once plans are better than the first, which is the rule's.
+    """Close in; yield after each slice once the plan is better than the first, the rule's.
 
-    What others make of that plan is worse, and takes as long. Where it is the best for some slices
-    they get it after all.
+    What other strategies make of that first plan is worse, and takes as long. If it remains the
+    best for some slices, they get it after all.
     """
     first = np.inf
     for number, _ in enumerate(close_in(search)):
@@ -224,7 +223,7 @@ def slices_beyond_the_first_plan(search: Search) -> Iterator[None]:
 
 
 def _chosen(active: Sequence[ActiveStrategy]) -> ActiveStrategy:
-    """Return who has waited too long, or else has gained most."""
+    """Return the strategy that has waited too long, or else that has gained most."""
     going = [one for one in active if not one.is_stalled] or active
     longest = max(going, key=lambda one: one.num_waits)
     if longest.num_waits >= TUNING.several:

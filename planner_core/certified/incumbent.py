@@ -1,4 +1,4 @@
-"""The best plan so far, the lowest bound, and how far they are apart."""
+"""The best plan so far, the lowest bound, and how far apart they are."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ class Incumbent:
     gap
         The share of the bound within which a plan is close enough.
     plan, bound
-        What is known at first; by default what must be taken, and what all targets are worth.
+        The initial ones; by default only what must be taken, and what all targets are worth.
     covers_starts
-        Whether bounds hold for plans with continuous starts too, where the problem has such.
+        Whether bounds also hold for plans with continuous starts, if the problem has such starts.
     verdict
-        The referee's, of a plan with all that must be taken; asked for where it is not at hand.
+        The referee's verdict on the plan with all that must be taken; by default it is computed.
 
     Attributes
     ----------
     plan, is_valid, reward
-        The best plan, and what the referee says of it.
+        The best plan, and the referee's verdict on it.
     bound
-        The lowest bound that is proven.
+        The lowest proven bound.
     unit
-        An amount of which what any plan earns is a multiple; 0 where there is none.
+        An amount of which every plan's reward is a multiple; 0 if there is none.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Incumbent:
 
     @property
     def is_close(self) -> bool:
-        """Whether plan and bound are as close as was asked for."""
+        """Whether plan and bound are within the requested gap."""
         return self.is_within(self.gap)
 
     @property
@@ -87,26 +87,26 @@ class Incumbent:
 
     @property
     def distance(self) -> float:
-        """How far plan and bound are apart, before bounds are rounded to what plans can earn."""
+        """How far apart plan and bound are, before bounds are rounded to what plans can earn."""
         return self._lowest - self.reward
 
     @property
     def better(self) -> float:
-        """What a plan must be worth that is better than the one at hand.
+        """The least reward of a plan that counts as better than the best one.
 
-        Refuting it must suffice for "optimal", so it stays well within the tolerance.
+        Refuting it must suffice for "optimal", so it lies well within the tolerance.
         """
         return self.reward + max(self.unit, 0.5 * SAME * self.reward, 1e-9)
 
     def is_within(self, gap: float, reward: float = 0.0) -> bool:
-        """Return whether the plan, or one worth ``reward``, is as close to the bound."""
+        """Return whether the plan, or one worth ``reward``, is within this gap of the bound."""
         reward, bound = max(self.reward, reward), self.bound.value
         return is_optimal(reward, bound, self.unit) or reward >= (1.0 - gap) * bound
 
     def offer(self, plan: Plan) -> bool:
-        """Take a plan if it is better; return whether it is.
+        """Take over a plan if it is better; return whether it is.
 
-        What must be taken is taken as well. A valid plan is better than any other.
+        What must be taken is added to it. A valid plan is better than any invalid one.
         """
         plan, timeline = self._in_its_best_form(plan.with_kept(self.problem))
         if (timeline.is_valid, timeline.reward) <= (self.is_valid, self.reward):
@@ -115,9 +115,9 @@ class Incumbent:
         return True
 
     def judge(self, plan: Plan) -> Timeline:
-        """Return what the referee says of a plan, without its curves.
+        """Return the referee's verdict on a plan, without its curves.
 
-        Searches come to the same plans again and again: of those judged last it is remembered.
+        Searches find the same plans again and again: the latest verdicts are remembered.
         """
         timeline = self._verdicts.pop(plan, None) or replay(self.problem, plan, in_detail=False)
         self._verdicts[plan] = timeline
@@ -126,7 +126,7 @@ class Incumbent:
         return timeline
 
     def _in_its_best_form(self, plan: Plan) -> tuple[Plan, Timeline]:
-        """Return a plan without images that only take room and earn nothing, and its verdict."""
+        """Return a plan without images that take space and earn nothing, and its verdict."""
         problem, timeline = self.problem, self.judge(plan)
         if not problem.counts_delivery or not timeline.is_valid:
             return plan, timeline
@@ -143,12 +143,12 @@ class Incumbent:
             return plan, timeline
         freed = Plan(actions)
         judged = self.judge(freed)
-        # A slow satellite may turn by way of an image that earns nothing.
+        # A slow satellite may need an image that earns nothing on its way.
         is_better = judged.is_valid and judged.reward >= timeline.reward
         return (freed, judged) if is_better else (plan, timeline)
 
     def lower(self, bound: Bound) -> bool:
-        """Note what no plan exceeds; return whether that is less than what was known."""
+        """Take over a bound if it is lower than the known one; return whether it is."""
         self._lowest = min(self._lowest, bound.value)
         value = rounded_bound(self.problem, bound.value, self.reward)
         if value >= self.bound.value:
@@ -157,7 +157,7 @@ class Incumbent:
         return True
 
     def report(self, message: str, reward: float = 0.0) -> None:
-        """Tell how far plan and bound are apart; a search may know of a better plan."""
+        """Report how far apart plan and bound are; ``reward`` is of a plan not yet offered."""
         reward = max(self.reward, reward)
         bound = max(self.bound.value, reward)
         is_known = np.isfinite(bound)
@@ -172,15 +172,15 @@ class Incumbent:
         )
 
     def solution(self, bound: Bound | None = None) -> Solution:
-        """Return the plan with what is known of it.
+        """Return the plan, why the search ended, and the proven bound.
 
         Parameters
         ----------
         bound
-            The same bound with all that proves it, where that is gathered at the end.
+            The same bound with its whole proof, if that is put together only at the end.
         """
         if not self._is_proof:
-            # Another start may suit the next task better: nothing here bounds that.
+            # Another start may suit the next task better: no bound here covers that.
             ended = self.budget.ending(is_optimal=False, is_close=False)
             return Solution(plan=self.plan, termination=ended)
         proven = bound or self.bound

@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from typing import TypeAlias
 
 Together: TypeAlias = Callable[..., None]
-"""Does pieces of work, and returns once all are done."""
+"""Runs pieces of work, and returns once all are done."""
 
 
 @contextmanager
 def side_by_side(num_threads: int) -> Iterator[Together]:
-    """Yield what does pieces of work on so many threads; with one, on that of the caller.
+    """Yield a function that runs pieces of work on so many threads; on the caller's if only one.
 
     >>> with side_by_side(1) as do:
     ...     do(lambda: print("a plan"), lambda: print("a bound"))

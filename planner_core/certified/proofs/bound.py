@@ -1,4 +1,4 @@
-"""A proven bound: its value, and what there is to check it with."""
+"""A proven bound: its value, and the proof by which it can be checked."""
 
 from __future__ import annotations
 
@@ -21,31 +21,32 @@ class Bound:
     Attributes
     ----------
     multipliers
-        What proves a Lagrangian bound (``lagrangian_value`` checks them) or one by dynamic
-        programmes (``resource_bound.resource_value``), one per target; None for other proofs.
-        Shape ``(num_targets,)``.
+        One for each target, if they prove the bound: Lagrangian ones (checked by
+        ``lagrangian_value``) or those of dynamic programmes (``resource_bound.resource_value``);
+        None for other proofs. Shape ``(num_targets,)``.
     is_elementary
-        Whether it is ``elementary_value`` that checks the multipliers.
+        Whether ``elementary_value`` checks the multipliers.
     contact_multipliers
-        What proves a bound with a half-life, with ``multipliers`` (``latency.latency_value``), one
-        for each contact; all 0 where batteries alone prove one without. Shape ``(num_contacts,)``.
+        One for each contact: with ``multipliers`` they prove a bound with a half-life
+        (``latency.latency_value``); all 0 if batteries alone prove one without a half-life. Shape
+        ``(num_contacts,)``.
     antenna_multipliers
-        What proves a bound by dynamic programmes, with ``multipliers``, where satellites want the
-        same antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.
+        With ``multipliers`` they prove a bound by dynamic programmes if satellites want the same
+        antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.
     queue_levels
-        Of energy in a collect, where exact programmes of queues prove a bound with a half-life
+        Levels of energy in a collect, if exact programmes of queues prove a bound with a half-life
         (``queues.queue_value``).
     exact_contacts
-        Rows of the contacts whose energy those do not round.
+        Rows of the contacts whose energy these programmes do not round.
     unit
-        In what the dynamic programmes count worth.
+        Unit in which the dynamic programmes count worth.
     certificate
-        What proves a Lagrangian bound that took cuts (``is_refuted`` checks it).
+        Proof of a Lagrangian bound that needs cuts (``is_refuted`` checks it).
     log
-        What the MILP solver reported, for a bound that it has proven.
+        Report of the MILP solver, for a bound that it has proven.
     on_board
-        What of the value is for images that were on board at the start
-        (``planner_core.problem.on_board``); the proof is of the rest.
+        Part of the value for images that were on board at the start
+        (``planner_core.problem.on_board``); the proof covers the rest.
     """
 
     value: float
@@ -62,25 +63,25 @@ class Bound:
     on_board: float = 0.0
 
     def with_on_board(self, most: float) -> Bound:
-        """Return the bound of new images and of those on board, which earn ``most`` at most."""
+        """Return the bound on new images and those on board, which earn at most ``most``."""
         return replace(self, value=self.value + most, on_board=most)
 
     def without_on_board(self) -> Bound:
-        """Return the bound of new images alone."""
+        """Return the bound on new images alone."""
         if self.on_board == 0.0:
             return self
         return replace(self, value=self.value - self.on_board, on_board=0.0)
 
 
 def reward_unit(problem: Problem) -> float:
-    """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
+    """Return an amount of which every plan's reward is a multiple; 0 if there is none."""
     return problem.reward_unit
 
 
 def rounded_bound(problem: Problem, value: float, reward: float) -> float:
-    """Return a bound rounded up for safety, then down to what whole rewards can add up to.
+    """Return a bound raised for safety, then rounded down to a multiple of the reward unit.
 
-    Never below ``reward``, which some plan has earned.
+    Never below ``reward``, which a known plan earns.
     """
     safe = value * (1.0 + 1e-12) + 1e-9
     unit = reward_unit(problem)
@@ -95,15 +96,15 @@ def is_optimal(reward: float, bound: float, unit: float) -> bool:
     Parameters
     ----------
     bound
-        What no plan exceeds.
+        An upper bound on every plan's reward.
     unit
-        An amount of which what any plan earns is a multiple; 0 where there is none.
+        An amount of which every plan's reward is a multiple; 0 if there is none.
     """
     return bound < reward + max(unit, SAME * reward, LEAST_BOUND)
 
 
 def accessible(problem: Problem) -> Bound:
-    """Return the bound that every accessible target is imaged: multipliers of its best worth."""
+    """Return the sum of all targets' best worths as a bound: these are its multipliers."""
     multipliers = problem.best_worth
     value = rounded_bound(problem, float(multipliers.sum()), 0.0)
     return Bound(value=value, proof="lagrangian", multipliers=multipliers)

@@ -2,11 +2,11 @@ r"""Proofs that no plan earns as much as some amount, checked without any search
 
 Multipliers :math:`\lambda_i \ge 0` for the targets and :math:`\mu_c \ge 0` for cuts
 :math:`a_c x \le b_c` bound what a plan earns by :math:`\sum_i \lambda_i + \sum_c \mu_c b_c`
-and, for each satellite, its heaviest path where task k on target i is worth
-:math:`\max(0, v_k - \lambda_i - \sum_c \mu_c a_{ck})`. The same with the path led through a
+plus, for each satellite, its heaviest path if task k on target i is worth
+:math:`\max(0, v_k - \lambda_i - \sum_c \mu_c a_{ck})`. The same sum with a path forced through a
 task bounds the plans that hold this task. A certificate is a sequence of multipliers: each
-strikes out the tasks that no plan worth the amount can hold, until no path is left that
-could be worth it.
+removes the tasks that no plan worth the amount can hold (reduced-cost fixing), until no path that
+remains could be worth it.
 """
 
 from __future__ import annotations
@@ -35,26 +35,26 @@ from planner_core.problem.restrict import restricted
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cut:
-    """An inequality that all plans keep, from sets of which a plan takes one task at most.
+    """An inequality that all plans satisfy, from sets of which a plan takes at most one task.
 
-    Add up the sets, halve, and round down; a single set stands for itself.
+    A single set is a clique cut; more are added up, halved and rounded down to a zero-half cut.
 
     Attributes
     ----------
     sets
-        Opportunities that exclude each other pairwise: of one target, or unrelated in the
-        order of one satellite. An odd number of sets.
+        Sets of collects that exclude each other pairwise: of one target, or of one satellite and
+        not comparable in the transitive closure of its precedence. An odd number of sets.
     """
 
     sets: tuple[Ints, ...]
 
     @property
     def limit(self) -> int:
-        """What the weighted tasks of a plan do not exceed."""
+        """The most that the weights of a plan's tasks add up to."""
         return max(1, (len(self.sets) - 1) // 2)
 
     def weights(self) -> tuple[Ints, Ints]:
-        """Return the opportunities of the cut and how much each counts."""
+        """Return the opportunities of the cut and the weight of each."""
         rows, counts = np.unique(np.concatenate(self.sets), return_counts=True)
         if len(self.sets) > 1:
             counts = counts // 2
@@ -80,15 +80,15 @@ class Multipliers:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Refutation:
-    """Why no plan of the tasks at hand is worth so much.
+    """The proof that no plan of the remaining tasks is worth some amount.
 
     Attributes
     ----------
     steps
-        Multipliers that strike out tasks one after another, down to none.
+        Multipliers that remove tasks step by step, until the last ones bound all that remains.
     branch
-        Where some remain: an opportunity, what refutes the plans that take it, and what
-        refutes those that leave it.
+        If they do not: an opportunity, the refutation of plans that take it, and that of plans
+        that leave it out.
     """
 
     steps: tuple[Multipliers, ...]
@@ -111,11 +111,11 @@ def is_refuted(problem: Problem, certificate: Certificate) -> bool:
 
 
 class _Checked:
-    """A problem and an amount that its plans do not reach, as is to be proven."""
+    """A problem, and the amount that its plans are to be proven not to reach."""
 
     def __init__(self, problem: Problem, amount: float) -> None:
         self._problem, self._amount = problem, amount
-        self._closures: dict[int, Precedence] = {}  # of satellites that a cut speaks of
+        self._closures: dict[int, Precedence] = {}  # of satellites with tasks in cuts
 
     def is_refuted(self, refutation: Refutation, left: Ints) -> bool:
         for step in refutation.steps:
@@ -135,7 +135,7 @@ class _Checked:
         if refutation.branch is None:
             return False
         row, taken, leaving = refutation.branch
-        # A slow satellite may pass by a target again, which is not to take it.
+        # Without transitivity a satellite may pass by a target again without taking it.
         beside = left[[a == row or not self._exclude(row, int(a)) for a in left]]
         return (
             is_transitive(self._problem)
@@ -158,7 +158,7 @@ class _Checked:
         return not are_comparable(self._closures[satellite], int(local[a]), int(local[b]))
 
     def _is_sound(self, cut: Cut) -> bool:
-        """Return whether the sets are an odd number and hold what excludes each other."""
+        """Return whether the sets are odd in number, each of tasks that exclude each other."""
         return len(cut.sets) % 2 == 1 and all(
             len(np.unique(group)) == len(group)
             and all(self._exclude(int(a), int(b)) for i, a in enumerate(group) for b in group[:i])
@@ -169,12 +169,12 @@ class _Checked:
 def values_through(
     problem: Problem, network: Network, rows: Ints, step: Multipliers, is_open: Bools | None = None
 ) -> tuple[float, Floats]:
-    """Return what bounds all plans, and the plans that hold each node of the network.
+    """Return the bound on all plans, and that on the plans that hold each node of the network.
 
     Parameters
     ----------
     network
-        Of the problem restricted to ``rows``.
+        Network of the problem restricted to ``rows``.
     is_open
         Which of the rows a plan may be paid for; all by default. Shape ``(len(rows),)``.
     """
@@ -187,7 +187,7 @@ def values_through(
 
 
 def is_below(value: Floats | float, amount: float) -> Bools:
-    """Return whether a bound is below an amount, whatever the rounding of its sum."""
+    """Return whether a bound is below an amount by more than its sum's rounding errors."""
     return np.asarray(value) < amount - ROUNDING * max(1.0, abs(amount))
 
 

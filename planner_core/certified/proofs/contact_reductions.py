@@ -1,7 +1,8 @@
-"""What multipliers of contacts say of plans worth more than some level: which contacts may follow.
+"""Which contacts may follow each other in plans worth more than some level, by multipliers.
 
-From a forward and a backward pass with multipliers (``LatencyRelaxation.most_by_pairs``) each pair
-of contacts that directly follow each other has a bound. Pairs below the level are in no such plan.
+A forward and a backward pass at multipliers of contacts (``LatencyRelaxation.most_by_pairs``) give
+a bound for each pair of contacts that directly follow each other. Pairs with a bound not above the
+level are in no such plan.
 """
 
 from __future__ import annotations
@@ -17,16 +18,16 @@ from planner_core.problem import Bools, Bytes, Floats, Ints, Problem
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Reduction:
-    """What plans worth more than some level have in common, of one satellite.
+    """What one satellite's plans worth more than some level have in common.
 
     Attributes
     ----------
     earliest
-        In the order of its contacts, the earliest contact that may come directly before each; the
-        last entry is the earliest that may be a path's last. -1 stands for the start. Shape
+        For each of its contacts, in order, the earliest contact that may come directly before it;
+        the last entry is the earliest that may be a path's last. -1 stands for the start. Shape
         ``(num_contacts + 1,)``.
     fixing
-        What leaves out states of the programme over queues.
+        Tells which states the programme over queues may leave out.
     """
 
     earliest: Ints
@@ -42,16 +43,16 @@ def reductions(
     exact: Bools,
     stop: Bytes,
 ) -> dict[int, Reduction]:
-    """Return what multipliers say of plans worth more than ``level``, by satellite.
+    """Return by satellite what plans worth more than ``level`` have in common.
 
-    Empty once ``stop`` is set; without satellites whose contacts share layers.
+    Empty once ``stop`` is set. Satellites whose contacts share layers are left out.
 
     Parameters
     ----------
     per_collect
-        How many levels of energy a collect takes, here and in the programme that this is for.
+        How many levels of energy a collect takes, here and in the programme over queues.
     exact
-        Opportunities whose energy both do not round. Shape ``(n,)``.
+        Opportunities whose energy neither of them rounds. Shape ``(n,)``.
     """
     given = LatencyMultipliers.of(problem, multipliers, contact_multipliers, None)
     most: dict[int, tuple[Floats, Fixing]] = {}
@@ -78,7 +79,7 @@ def reductions(
 
 def _earliest(may_follow: Bools) -> Ints:
     num_contacts = len(may_follow) - 1
-    # Where nothing leads to a contact its layer is empty: it would begin at the contact itself.
+    # If nothing may lead to a contact its layer is empty: it would begin at the contact itself.
     none = np.minimum(np.arange(num_contacts + 1), num_contacts - 1)
     found = np.where(may_follow.any(axis=0), may_follow.argmax(axis=0) - 1, none)
     return found.astype(np.int32)

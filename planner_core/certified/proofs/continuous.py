@@ -1,10 +1,10 @@
 r"""A bound on plans with continuous starts.
 
 Weak duality as in ``planner_core.certified.proofs.lagrangian``: multipliers of targets, and for
-each satellite the heaviest chain of its tasks, here with starts anywhere in the accesses and no
-access twice. ``planner_core.certified.dp.start_labels`` says why its labels never fall below the
-heaviest chain. It needs satellites that turn faster than lines of sight do: then the earliest start
-is the best one, and chains are sequences of accesses.
+each satellite the heaviest chain of its tasks, here with starts anywhere in the accesses and each
+access used at most once. ``planner_core.certified.dp.start_labels`` explains why its labels are
+never worth less than the heaviest chain. Satellites must turn faster than lines of sight do: then
+the earliest start is the best one, and chains are sequences of accesses.
 
 Battery, recorder, stations and antennas are left out, which can only raise the bound.
 """
@@ -39,7 +39,7 @@ from planner_core.worth import surplus, weights
 
 
 def quick_bound(problem: Problem) -> Bound:
-    """Return the better of the bounds that take no time."""
+    """Return the lower of the bounds that take next to no time."""
     totals, every = totals_bound(problem), accessible(problem)
     return every if totals is None or every.value <= totals.value else totals
 
@@ -51,28 +51,28 @@ def continuous_value(problem: Problem, multipliers: Floats) -> float:
         if dual is not None:
             value, _ = dual.at(multipliers)
             return value
-    # Multipliers of the best worth leave nothing to earn on any chain.
+    # Multipliers of the targets' best worth leave nothing to earn on any chain.
     return float(problem.best_worth.sum())
 
 
 def width_for(problem: Problem) -> float:
-    """Return how wide cells are, so that tables have a size that a machine can hold."""
+    """Return the width of cells at which tables are small enough for a machine."""
     width_s = TUNING.widths_s[0] * num_followers(problem, TUNING.widths_s[0]) / MAX_PAIRS
     return float(np.clip(width_s, *TUNING.widths_s))
 
 
 def rough_cell_s() -> float:
-    """Return how wide cells are where a search only needs to know about where it goes."""
+    """Return the width of cells for a search that only needs a rough direction."""
     return TUNING.several * TUNING.widths_s[0]
 
 
 def num_followers(problem: Problem, width_s: float) -> float:
-    """Return about how many followers the tables of all satellites have."""
+    """Return an estimate of how many followers the tables of all satellites have."""
     count = 0.0
     for index in range(len(problem.satellites)):
         spans = spans_of(problem, index)
         free_s = spans.close_s - spans.open_s
-        # Of what is open at a time, about four times as much comes next.
+        # About four times as many tasks may come next as are open at a time.
         mean_open = float((free_s + spans.length_s).sum()) / problem.horizon_s
         count += 4.0 * mean_open * float((free_s / width_s + 1.0).sum())
     return count
@@ -80,13 +80,15 @@ def num_followers(problem: Problem, width_s: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ContinuousDual:
-    """The function of multipliers whose every value is a bound.
+    """The dual function: its value at any multipliers is a bound.
 
     Attributes
     ----------
     parts
-        Tasks of which one chain each is taken: pieces of the satellites' days. A chain of the
-        day is one of each piece, or none, so what they are worth together bounds it.
+        Pieces of the satellites' days, of which one chain each is taken. A chain of a whole day
+        consists of at most one chain of each piece, so their worths together bound it.
+    is_offered
+        Whether any access images the target. Shape ``(num_targets,)``.
     """
 
     problem: Problem
@@ -97,10 +99,7 @@ class ContinuousDual:
     def of(
         cls, problem: Problem, width_s: float, stop: Bytes | None = None
     ) -> ContinuousDual | None:
-        """Return it; None where a satellite turns more slowly than its lines of sight.
-
-        None as well once ``stop[0]`` is not zero.
-        """
+        """Return it; None if a satellite is slower than its lines of sight, or ``stop`` is set."""
         parts = []
         is_offered = np.zeros(len(problem.target_ids), dtype=np.bool_)
         for index in range(len(problem.satellites)):
@@ -118,11 +117,11 @@ class ContinuousDual:
         return cls(problem=problem, parts=tuple(parts), is_offered=is_offered)
 
     def clipped(self, multipliers: Floats) -> Floats:
-        """Return multipliers as they count."""
+        """Return multipliers within 0 and the best worth; 0 for targets without an access."""
         return np.where(self.is_offered, surplus(multipliers, self.problem.best_worth), 0.0)
 
     def at(self, multipliers: Floats, *, is_exact: bool = True) -> tuple[float, Ints]:
-        """Return the value at multipliers, and how often the chains there take each target.
+        """Return the value at these multipliers, and how often their chains take each target.
 
         Only the exact value is a bound.
         """
@@ -136,7 +135,7 @@ class ContinuousDual:
         return total, counts
 
     def chain(self, number: int, multiplier: Floats, *, is_exact: bool) -> tuple[float, Ints]:
-        """Return the heaviest chain of one part: its worth, and the targets that it is paid for."""
+        """Return the worth of one part's heaviest chain, and the targets that it is paid for."""
         cells, labels = self.parts[number]
         worth = self.problem.worth[cells.spans.row]
         weight = weights(worth, multiplier[cells.spans.site])
@@ -151,7 +150,7 @@ class ContinuousDual:
 
 
 def pieces_of(spans: TimeWindows) -> list[TimeWindows]:
-    """Return tasks in pieces of a day: cut where nothing is open, or little in a long while."""
+    """Return tasks in pieces of a day: cut where nothing is open, and long ones where little is."""
     ends_s = np.maximum.accumulate(spans.close_s + spans.length_s)
     is_clear = spans.open_s[1:] >= ends_s[:-1] + TUNING.tidy_s
     pieces: list[TimeWindows] = []

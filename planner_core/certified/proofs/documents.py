@@ -1,4 +1,4 @@
-"""Proven bounds as documents: written down with a plan, read back, and checked anew."""
+"""Proven bounds as documents: stored with a plan, read back, and checked again."""
 
 from __future__ import annotations
 
@@ -90,17 +90,17 @@ def from_json(text: str) -> Bound:
 
 
 def is_proven(problem: Problem, bound: Bound) -> bool | None:
-    """Return whether the stored multipliers prove the bound; None where there are none.
+    """Return whether the stored proof proves the bound; None if it is only a log of HiGHS.
 
-    Nothing of the search that found them is used: they are put into the dual function of
-    ``problem``, whose value is a bound whatever they are. What HiGHS has proven has its log.
+    Nothing of the search that found it is used: multipliers are put into the dual function of
+    ``problem``, whose value is a bound whatever they are.
     """
     room = WRITTEN * max(1.0, abs(bound.value))
     if bound.on_board < most_on_board(problem) - room:
         return False
     bound = bound.without_on_board()
     if problem.continuous_starts and bound.certificate is not None:
-        # It strikes out tasks at the starts of opportunities, and others remain.
+        # It removes tasks at the opportunities' starts only; other starts remain possible.
         return False
     if bound.certificate is not None:
         is_enough = bound.certificate.amount <= bound.value + (reward_unit(problem) or room)

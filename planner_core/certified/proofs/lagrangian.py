@@ -5,7 +5,7 @@ collects. Then no plan earns more than :math:`\sum_i \lambda_i` plus, for each s
 heaviest path of tasks in which collect k of :math:`i` is worth :math:`\max(0, v_k - \lambda_i)`
 (and may be followed by others of :math:`i`).
 Battery, recorder and stations are left out, which can only raise the bound. Multipliers come from
-an ascent; whatever they are, the bound holds.
+an ascent; the bound holds at any multipliers.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def lagrangian_value(problem: Problem, multipliers: Floats) -> tuple[float, Ints
     return float(total), counts[:-1]
 
 
-# Steps of one search ask again before they know a better plan.
+# Steps of a search ask for the same bound again until they know a better plan.
 _latest: WeakKeyDictionary[Problem, tuple[tuple[float, int], Bound]] = WeakKeyDictionary()
 
 
@@ -57,10 +57,10 @@ def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = N
     Parameters
     ----------
     reward
-        Of a known plan.
+        The reward of a known plan.
     num_epochs
-        How long; by default as long as a fraction of a second allows, counted from the size of
-        the problem so that the same problem always gets the same bound.
+        Epochs of the ascent; by default as many as take a fraction of a second, counted from the
+        size of the problem so that the same problem always gets the same bound.
     """
     if num_epochs is None:
         num_epochs = default_epochs(len(problem.opportunities))
@@ -85,6 +85,6 @@ def lagrangian_bound(problem: Problem, reward: float, num_epochs: int | None = N
 
 
 def default_epochs(num_nodes: int) -> int:
-    """Return how many epochs of an ascent a network is worth."""
+    """Return how many epochs an ascent on a network of this size runs."""
     least, most = TUNING.epochs // 2, TUNING.epochs
     return int(np.clip(TUNING.quick_nodes / max(1, num_nodes), least, most))

@@ -1,9 +1,9 @@
-r"""An upper bound where images are worth less the later they come down: multipliers of contacts.
+r"""An upper bound if images are worth less the later they come down: multipliers of contacts.
 
-Each target has a multiplier :math:`\lambda_i`, and each contact :math:`c` one for what it takes
-down by volume, :math:`\mu_c`. The bits of an image come down in contacts after it that the plan
+Each target has a multiplier :math:`\lambda_i`, and each contact :math:`c` one for the volume that
+it takes down, :math:`\mu_c`. The bits of an image come down in contacts after it that the plan
 takes, and none before the contact is ready. So an image that takes :math:`s_k` of the recorder is
-worth no more than what it is worth on board and the best of its contacts adds,
+worth at most what it is worth on board plus what the best of its contacts adds,
 
 .. math::
 
@@ -11,10 +11,10 @@ worth no more than what it is worth on board and the best of its contacts adds,
 
 and a contact that is taken earns :math:`\mu_c` times what it can take down. No plan earns more
 than :math:`\sum_i \lambda_i` plus, for each satellite, the most that a path under its battery
-gains of :math:`(w_k - \lambda_i)^+` and of contacts. Of an image's contacts the one that the path
-takes next counts, and all later ones (``planner_core.certified.dp.contact_layers``). Where
-satellites want an antenna at the same time contacts pay for their places, as in ``resource_bound``.
-Left out are the order in which bits come down and what telemetry takes of a contact.
+gains by :math:`(w_k - \lambda_i)^+` and by contacts. An image may use the contact that the path
+takes next and all later ones, taken or not (``planner_core.certified.dp.contact_layers``). If
+satellites want an antenna at the same time, contacts pay for it, as in ``resource_bound``. Left out
+are the order in which bits come down and what telemetry takes of a contact.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ class _Terms(NamedTuple):
     Attributes
     ----------
     end_s, on_board, most, size
-        Of each task: when it ends, what it earns on board, what it earns at most, and what it takes
-        of a recorder. Shape ``(m,)``.
+        Of each task: when it ends, what it earns on board, the most it earns, and its data as a
+        share of the recorder. Shape ``(m,)``.
     ready_s, volume
-        Of each contact: from when on it takes down data, and how much of a recorder. Shape
-        ``(num_contacts,)``.
+        Of each contact: from when it takes down data, and how much, as a share of the recorder.
+        Shape ``(num_contacts,)``.
     decaying
-        What an image earns more if it comes down at once. Shape ``(m,)``.
+        What an image earns in addition if it comes down at once. Shape ``(m,)``.
     """
 
     end_s: Floats
@@ -84,9 +84,9 @@ class Tolls(NamedTuple):
     Attributes
     ----------
     by_volume
-        What images pay to come down in each, and it earns for what it can take.
+        What images pay to come down in each contact, and what it earns for all it can take.
     antenna
-        What each pays for its antenna.
+        What each contact pays for its antenna.
     """
 
     by_volume: Floats
@@ -100,11 +100,11 @@ class LatencyRelaxation:
     Attributes
     ----------
     target
-        Of each task; one too far for contacts. Shape ``(m,)``.
+        The target of each task; ``num_targets`` for contacts. Shape ``(m,)``.
     contacts
         Rows of the problem's table. Shape ``(num_contacts,)``.
     typical
-        What an image takes of the recorder, about; 1 where that is nothing.
+        Median share of the recorder that an image takes; 1 if that is nothing.
     may_need_all
         Whether a path may need tasks that are worth nothing.
     """
@@ -147,7 +147,7 @@ class LatencyRelaxation:
             levels = levels_of_estimate(network, per_collect)
         else:
             levels = levels_of_proof(network, per_collect, None if exact is None else exact[rows])
-        # There a path gains nothing by a task that is worth nothing, neither energy nor a turn.
+        # With transitivity a worthless task then gains a path nothing, neither energy nor a turn.
         is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
         return cls(
             rows=rows,
@@ -171,24 +171,24 @@ class LatencyRelaxation:
         )
 
     def most(self, multipliers: Floats, tolls: Tolls) -> tuple[float, Ints, Ints]:
-        """Return the most that the satellite can gain, the rows of a path that does, and layers.
+        """Return the most that the satellite can gain, a path that gains it, and its layers.
 
         Parameters
         ----------
         multipliers
-            Of targets, and none for contacts. Shape ``(num_targets + 1,)``.
+            Of targets, and a 0 for contacts. Shape ``(num_targets + 1,)``.
         tolls
-            Of its contacts.
+            Of the satellite's contacts.
         """
         m, weight = len(self.rows), self._weight(multipliers, tolls)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
 
     def most_by_pairs(self, multipliers: Floats, tolls: Tolls) -> tuple[Floats, Fixing] | None:
-        """Return the most that it can gain by each pair of contacts that follow each other.
+        """Return the most that it can gain with each pair of contacts directly after each other.
 
-        As ``contact_pairs.most_by_pairs`` has it, with what leaves out states of the programme
-        over queues; None where contacts share layers. Shape
+        See ``contact_pairs.most_by_pairs``. Also returns what tells which states the programme over
+        queues may leave out. None if contacts share layers. Shape
         ``(num_contacts + 1, num_contacts + 1)``.
         """
         if len(self.layers.first) <= len(self.contacts):
@@ -220,12 +220,12 @@ class LatencyRelaxation:
         return weight
 
     def loads(self, path: Ints, layer: Ints, tolls: Tolls) -> Floats:
-        """Return what a path lets each contact take down more than it can.
+        """Return how much more data than it can take down a path gives to each contact.
 
         Parameters
         ----------
         path, layer
-            As ``most`` answers them.
+            As returned by ``most``.
 
         Returns
         -------
@@ -261,14 +261,14 @@ def _weigh(
     passed: float,
     weight: Floats,
 ) -> None:
-    """Fill in what each task is worth in each layer; ``passed`` where that is nothing.
+    """Fill in what each task is worth in each layer; ``passed`` if that is nothing.
 
     Parameters
     ----------
     tolls
         What images pay to each contact, by volume. Shape ``(num_contacts,)``.
     earned
-        What each contact earns that is taken. Shape ``(num_contacts,)``.
+        What each contact earns if it is taken. Shape ``(num_contacts,)``.
     """
     num_layers, m = weight.shape
     gain = np.zeros(m)
@@ -295,14 +295,14 @@ def latency_relaxations(
     per_collect: int | None = None,
     exact: Bools | None = None,
 ) -> tuple[LatencyRelaxation, ...]:
-    """Return the programmes of all satellites that have anything to do.
+    """Return the programmes of all satellites that have opportunities.
 
     Parameters
     ----------
     is_estimate
-        Whether energy may be rounded so that plans are lost, in a search for multipliers.
+        Whether rounding energy may lose plans: enough for a search for multipliers.
     per_collect
-        How many levels of energy a collect takes; as many as tuning says by default.
+        How many levels of energy a collect takes; by default ``TUNING.levels_per_collect``.
     exact
         Opportunities whose energy a proof does not round, none by default. Shape ``(n,)``.
     """
@@ -331,7 +331,7 @@ def latency_value(
     contact_multipliers
         By volume, of the table's contacts in order. Shape ``(num_contacts,)``.
     antenna_multipliers
-        Of ``antenna_groups``; none by default.
+        Of ``antenna_groups``; 0 by default. Shape ``(num_groups,)``.
     """
     given = LatencyMultipliers.of(problem, multipliers, contact_multipliers, antenna_multipliers)
     relaxations = latency_relaxations(problem)
@@ -345,11 +345,11 @@ class LatencyMultipliers(NamedTuple):
     Attributes
     ----------
     targets
-        A 0 at the end. Shape ``(num_targets + 1,)``.
+        With a 0 at the end. Shape ``(num_targets + 1,)``.
     by_volume, antenna
-        Of each opportunity, what a contact asks. Shape ``(n,)``.
+        Multipliers of each opportunity that is a contact; 0 for others. Shape ``(n,)``.
     paid
-        What all multipliers come to.
+        The bound's constant: multipliers of targets, and of antennas times their limits.
     """
 
     targets: Floats
@@ -361,7 +361,7 @@ class LatencyMultipliers(NamedTuple):
     def of(
         cls, problem: Problem, targets: Floats, contacts: Floats, antennas: Floats | None
     ) -> LatencyMultipliers:
-        """Return these multipliers, of contacts and antennas as ``latency_value`` has them."""
+        """Return these multipliers; those of contacts and antennas are as in ``latency_value``."""
         multiplier = np.append(surplus(targets, problem.best_worth), 0.0)
         by_volume = np.zeros(len(problem.opportunities))
         by_volume[problem.opportunities.kind == CONTACT] = np.maximum(contacts, 0.0)
@@ -373,5 +373,5 @@ class LatencyMultipliers(NamedTuple):
         )
 
     def tolls_of(self, one: LatencyRelaxation) -> Tolls:
-        """Return what the contacts of a satellite ask."""
+        """Return the multipliers of a satellite's contacts."""
         return Tolls(self.by_volume[one.contacts], self.antenna[one.contacts])

@@ -1,10 +1,10 @@
-r"""An upper bound where images are worth less the later they come down: queues before contacts.
+r"""An upper bound if images are worth less the later they come down: queues before contacts.
 
-Multipliers of targets, as in ``latency``: for each satellite an exact programme knows which contact
-comes next and what waits for it (``planner_core.certified.dp.contact_queues``). Left out are
-antennas. Multipliers of contacts say which of them may follow each other in a plan that earns more
-than some level (``planner_core.certified.dp.contact_pairs``); what is left takes seconds where
-those multipliers take hundredths, and proves a percent more.
+Targets have multipliers as in ``latency``, and for each satellite an exact programme knows which
+contact comes next and what data waits for it (``planner_core.certified.dp.contact_queues``).
+Antennas are left out. Multipliers of contacts tell which contacts may follow each other in a plan
+that earns more than some level (``planner_core.certified.dp.contact_pairs``). The programme over
+what remains takes seconds, not hundredths as with those multipliers, and proves a percent more.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from planner_core.worth import surplus
 
 
 def is_supported(satellite: SatelliteProblem) -> bool:
-    """Return whether no path of the satellite needs a task that is worth nothing."""
+    """Return whether the satellite's paths never need a task that is worth nothing."""
     own = satellite.resources
     is_dear = own.sun_pointing == "free" and own.idle_drain_per_s == 0.0
     return is_dear and is_transitive_on(satellite)
@@ -42,9 +42,9 @@ def queue_value(
 ) -> tuple[float, Ints]:
     """Return the bound that multipliers of targets prove, and the rows of paths that reach it.
 
-    Infinite where the programme would take too long, or ``stop`` is set. With multipliers of
-    contacts paths that by these earn no more than ``level`` are left out; the bound is ``level`` at
-    least.
+    Infinite if the programme does not support a satellite or would take too long, or ``stop`` is
+    set. With multipliers of contacts, paths that earn no more than ``level`` by these are left out;
+    the bound is at least ``level``.
 
     Parameters
     ----------
@@ -53,9 +53,10 @@ def queue_value(
     per_collect
         How many levels of energy a collect takes.
     contact_multipliers
-        As of ``latency_value``. Shape ``(num_contacts,)``.
+        Multipliers as for ``latency_value``. Shape ``(num_contacts,)``.
     exact_contacts
-        Rows of contacts whose energy is not rounded in favour of the satellite; that of others is.
+        Rows of contacts whose energy is not rounded. All others' is, in the satellite's favour,
+        except for opportunities that must be taken.
     """
     multiplier = surplus(multipliers, problem.best_worth)
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop

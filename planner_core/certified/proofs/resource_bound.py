@@ -1,12 +1,12 @@
-r"""An upper bound that battery and recorder tighten: multipliers, and exact dynamic programmes.
+r"""An upper bound tightened by battery and recorder: multipliers and exact dynamic programmes.
 
 As in ``planner_core.certified.proofs.lagrangian`` each target has a multiplier :math:`\lambda_i`,
 and no plan earns more than :math:`\sum_i \lambda_i` plus what each satellite can gain where an
 image of :math:`i` is worth :math:`r_i - \lambda_i`. Here the satellite's gain is the most that its
 battery and its recorder allow, not only its agility. Worth is counted in whole units, rounded up,
-so the bound holds for any unit; multipliers chosen to leave whole units lose nothing by it. Where
-satellites want the same antennas at a time those have multipliers, too, which contacts pay
-(``planner_core.precedence.antennas``).
+so the bound holds for any unit; multipliers chosen to leave whole units lose nothing by it. If
+satellites want the same antennas at the same time, antennas have multipliers too, which contacts
+pay (``planner_core.precedence.antennas``).
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ def whole_worth(
 ) -> Ints:
     """Return what each opportunity is worth at these multipliers, in units, rounded up.
 
-    Contacts cost what their antennas do, or more than all images are worth: no path pays that.
+    Contacts cost their antennas' multipliers (rounded down), or a unit more than all images are
+    worth if that is less: no path pays that.
     """
     table = problem.opportunities
     is_collect = table.kind == COLLECT
@@ -52,8 +53,8 @@ def resource_value(
 ) -> float:
     """Return the bound that multipliers of targets, and of antennas if there are any, prove.
 
-    This is the whole proof: it needs no search, only the problem. However finely the recorder is
-    counted the bound holds; as neither fineness is always better, the lower bound counts.
+    This is the whole proof: it needs no search, only the problem. The bound holds however finely
+    the recorder is counted; as neither of two finenesses is always better, the lower bound counts.
     """
     stop = np.zeros(1, dtype=np.uint8)
     return min(
@@ -65,9 +66,9 @@ def resource_value(
 
 
 def value_at(problem: Problem, multipliers: Floats, unit: float, enough: float) -> float:
-    """Return the bound of ``resource_value``, or ``enough`` where that is more.
+    """Return the bound of ``resource_value`` with one fineness, or ``enough`` if that is more.
 
-    The finer recorder is asked where one satellite is to be asked, which may stop early.
+    The recorder is counted finely if there is only one satellite: its programme may stop early.
     """
     stop = np.zeros(1, dtype=np.uint8)
     is_alone = sum(len(s) > 0 for s in problem.satellites) == 1
@@ -84,11 +85,11 @@ def _value(
     stop: Bytes,
     antenna_multipliers: Floats | None = None,
 ) -> float:
-    """Return the bound of these multipliers, or ``enough`` where that is more."""
+    """Return the bound at these multipliers, or ``enough`` if that is more."""
     multipliers = surplus(multipliers, problem.best_worth)
     worth = whole_worth(problem, multipliers, unit, antenna_multipliers)
     paid = float(multipliers.sum()) + paid_for_antennas(problem, antenna_multipliers)
-    # What the other satellites gain is known only afterwards: one alone may stop early.
+    # Only a single satellite may stop early: of several, what the others gain is not yet known.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
     units = sum(s.most(worth, unit, max(units_enough, 0), stop)[0] for s in satellites)
     rounded_away = ROUNDING * len(problem.opportunities) * unit
@@ -101,14 +102,14 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     Parameters
     ----------
     reward
-        What a known plan earns: nothing below it needs proof.
+        What a known plan earns: no bound can be lower.
     """
     best = lagrangian_bound(problem, reward)
     if is_optimal(reward, best.value, reward_unit(problem)):
         return best
     if problem.counts_delivery and problem.objective.half_life_s is not None:
         return _with_half_life(problem, best, reward)
-    # Where all targets are worth the same and energy is short, multipliers of zero are best.
+    # If all images are worth the same and energy is short, multipliers of zero are best.
     is_plain = len(problem.satellites) == 1 and _is_alike(problem)
     satellites: tuple[SatelliteRelaxation, ...] = ()
     if problem.use_resources:
@@ -128,7 +129,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     if is_plain:
         offered = offered[:1]
     else:
-        # What the battery alone allows takes a fraction of the time, and tells which are best.
+        # The bound by batteries alone takes a fraction of the time, and shows which are best.
         offered.sort(key=lambda multipliers: _battery_value(problem, satellites, multipliers, unit))
     for multipliers in offered[: TUNING.tries]:
         value = _value(problem, satellites, multipliers, unit, reward, stop)
@@ -139,7 +140,7 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
 
 
 def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
-    """Return a bound that knows what contacts take, which counts for more than recorders."""
+    """Return the bound by multipliers of contacts, which matter more here than recorders."""
     assert best.multipliers is not None
     num_rounds = TUNING.latency_work // max(1, len(problem.opportunities))
     num_rounds = int(np.clip(num_rounds, TUNING.tries, TUNING.rounds))
@@ -153,13 +154,13 @@ def _with_half_life(problem: Problem, best: Bound, reward: float) -> Bound:
 def _battery_value(
     problem: Problem, satellites: tuple[SatelliteRelaxation, ...], multipliers: Floats, unit: float
 ) -> float:
-    """Return what bounds all plans where recorders are left out."""
+    """Return the bound at these multipliers without recorders."""
     worth = whole_worth(problem, multipliers, unit)
     return float(multipliers.sum()) + unit * sum(s.most_by_battery(worth) for s in satellites)
 
 
 def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:
-    """Return a unit: 1 where rewards are whole and few, or what can be counted in good time."""
+    """Return a unit of worth that can be counted in good time: 1 if rewards are whole and few."""
     largest = max(len(s.satellite) for s in satellites)
     most_units = min(TUNING.max_units, MAX_CELLS // largest)
     if problem.reward_unit > 0.0 and value <= most_units:
@@ -173,15 +174,15 @@ def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: 
 def leaving_whole_units(
     problem: Problem, multipliers: Floats, unit: float, typical: Floats | None = None
 ) -> Floats:
-    """Return the nearest multipliers at which an image of each target is worth whole units.
+    """Return the nearest multipliers at which one image of each target is worth whole units.
 
-    Other images of it are then rounded up, which costs a bound up to a unit for each that is
-    taken: the typical one should be the one that plans take.
+    Other images of the target are rounded up, which costs the bound up to a unit for each that is
+    taken: ``typical`` should be the image that plans take.
 
     Parameters
     ----------
     typical
-        What that image earns; by default the best of the target. Shape ``(num_targets,)``.
+        What that image earns; by default the target's best worth. Shape ``(num_targets,)``.
     """
     worth = problem.best_worth if typical is None else typical
     units = np.round((worth - multipliers) / unit)

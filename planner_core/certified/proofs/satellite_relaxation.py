@@ -1,6 +1,6 @@
-"""What one satellite can gain at most by its battery and its recorder: a dynamic programme.
+"""The most that one satellite's battery and recorder let it gain: a dynamic programme.
 
-The recorder is counted in levels, in favour of the satellite; what it gains bounds any plan of it.
+The recorder is counted in levels, rounded in favour of the satellite, so the gain bounds its plans.
 """
 
 from __future__ import annotations
@@ -38,12 +38,13 @@ class SatelliteRelaxation:
     Attributes
     ----------
     classes
-        The levels with the last image in one span after another, from the last one on, where it
-        must come down: what may be left at the end hangs on that. The same levels otherwise.
+        One set of levels for each time span the last image may lie in, latest first, if every
+        image must come down (how much data may remain at the end depends on the last image). A
+        single set otherwise.
     shares
-        What images earn less that stay on board, where they earn something there.
+        What images lose by staying on board, if they earn something there.
     data_multiplier
-        What the data of a collect is worth, about, in typical collects.
+        Multiplier of the data of the smallest collect, as a share of a typical collect's worth.
     """
 
     satellite: SatelliteProblem
@@ -68,18 +69,18 @@ class SatelliteRelaxation:
 
     @property
     def num_near_steps(self) -> int:
-        """How many pairs of tasks near each other are looked at for each unit of worth."""
-        # With shares by the battery alone as well, as often as it takes to halve all instants.
+        """How many pairs of near tasks are visited for each unit of worth."""
+        # With shares the battery alone is evaluated too, at each step of a bisection of instants.
         passes = 1 if self.shares is None else 1 + len(self.shares.since_s).bit_length()
         return passes * len(self.network.near_rows)
 
     def with_data_multiplier(self, num_images: int) -> SatelliteRelaxation:
-        """Return the same with the multiplier of data at which the battery alone allows least.
+        """Return the same with the data multiplier at which the bound by the battery is lowest.
 
         Parameters
         ----------
         num_images
-            How many are expected, about.
+            How many images a plan is expected to take, roughly.
         """
         num_units = TUNING.levels_per_collect
         while num_units * num_images * len(self.satellite) > MAX_CELLS:
@@ -93,12 +94,12 @@ class SatelliteRelaxation:
             )
             if needs.top >= least:
                 break
-            # A higher multiplier allows less, or is the last: its tables need be no larger.
+            # The next multiplier's bound is lower, or it is the last: tables need not be larger.
             best, least, near = trial, needs.top, needs.top
         return best
 
     def without(self, is_shut: Bools) -> SatelliteRelaxation:
-        """Return the same where some tasks cannot be taken. Shape ``(m,)``."""
+        """Return the same with some tasks that cannot be taken. Shape ``(m,)``."""
 
         def shut(levels: DataLevels) -> DataLevels:
             return levels._replace(before=np.where(is_shut, -1, levels.before).astype(np.int32))
@@ -115,21 +116,21 @@ class SatelliteRelaxation:
         near: int | None = None,
         keeps_path: bool = False,
     ) -> tuple[int, Ints | None]:
-        """Return the most units that the satellite can gain, and the rows of a path that does.
+        """Return the most units that the satellite can gain, and the rows of a path that gains it.
 
-        Answers a cheaper bound on it, and no path, once ``stop`` is set or where the most is
-        known to be below ``enough`` (which it answers then).
+        Returns a cheaper bound and no path once ``stop`` is set; returns ``enough`` and no path if
+        the maximum is known to be below ``enough``.
 
         Parameters
         ----------
         worth
-            In units, of every opportunity of the problem. Shape ``(n,)``.
+            Worth of every opportunity of the problem, in units. Shape ``(n,)``.
         unit
-            What they are.
+            The worth of a unit.
         near
-            What is expected at least, if anything.
+            A gain that is expected at least, if one is known.
         keeps_path
-            Whether to answer the path.
+            Whether to return the path.
         """
         weight = worth[self.satellite.rows]
         if self.shares is not None:
@@ -139,7 +140,7 @@ class SatelliteRelaxation:
         )
 
     def most_by_battery(self, worth: Ints) -> int:
-        """Return the most units that the battery alone allows, with ``worth`` as for ``most``."""
+        """Return the most units that the battery alone allows; ``worth`` as for ``most``."""
         weight = worth[self.satellite.rows]
         return _Needs.of(self.network, self.levels, weight, 0.0, None).top
 
@@ -152,10 +153,10 @@ class SatelliteRelaxation:
         near: int | None,
         keeps_path: bool,
     ) -> tuple[int, Ints | None]:
-        """Return the same where images earn a share on board; see ``Shares``.
+        """Return the same if images earn a share on board; see ``Shares``.
 
-        The instant that tells the two cases apart is tried where the first of them is known not to
-        matter, and once more where what the second came to says so.
+        The instant between its two cases is first the latest at which the first case gains no more
+        than the goal, then, if that differs, the latest at which it gains no more than the second.
         """
         shares = self.shares
         assert shares is not None
@@ -164,11 +165,11 @@ class SatelliteRelaxation:
             goal = int(
                 TUNING.first_goal * _Needs.of(self.network, self.levels, weight, 0.0, near).top
             )
-        # By the battery alone smaller units take next to no time, unless near pairs are many.
+        # By the battery alone smaller units take next to no time, unless there are many near pairs.
         num_cells = goal * (len(weight) + len(self.network.near_rows))
         finer = max(1, min(shares.finer(unit), MAX_CELLS // max(1, num_cells)))
 
-        @cache  # both searches for an instant look at the same ones
+        @cache  # both searches for an instant try the same ones
         def before(since: int) -> int:
             own = shares.weights_before(weight, unit, since, finer)
             most = int(_Needs.of(self.network, self.levels, own, 0.0, finer * goal).top)
@@ -197,13 +198,13 @@ class SatelliteRelaxation:
         near: int | None,
         keeps_path: bool,
     ) -> tuple[int, Ints | None]:
-        """Return the same at these weights and costs of what a recorder holds at the end."""
+        """Return the same at these weights and these costs of the recorder's level at the end."""
         best, path = UNREACHED, None
         for number, levels in enumerate(self.classes):
             least = max(enough, best + 1)
             own = np.where(levels.before < 0, 0, weight).astype(np.int32)
             if number and _Needs.of(self.network, levels, own, 0.0, near).top < least:
-                break  # there is no more to gain by images that lie earlier still
+                break  # an even earlier last image cannot gain more
             gained, found = self._most_of_class(
                 levels, own, end_cost, least, stop, near, keeps_path
             )
@@ -223,12 +224,12 @@ class SatelliteRelaxation:
         near: int | None,
         keeps_path: bool,
     ) -> tuple[int, Ints | None]:
-        """Return the most units and a path, ``UNREACHED`` if that is below ``least``, ``STOPPED``.
+        """Return the most units and a path; ``UNREACHED`` if below ``least``, or ``STOPPED``.
 
         Parameters
         ----------
         levels
-            The recorder where the last image lies in a certain span.
+            The recorder's levels if the last image lies in a certain span.
         weight, end_cost
             In units, of each task of the satellite and of each level at the end. Shapes ``(m,)``
             and ``(num_levels,)``.
@@ -240,7 +241,7 @@ class SatelliteRelaxation:
         if near is not None and near < top:
             goal = min(top, near + step)
         while goal >= least:
-            # Labels that cannot reach the goal are dropped: the higher, the quicker.
+            # Labels that cannot reach the goal are dropped: the higher the goal, the quicker.
             goal = max(least, goal - step, 0)
             wanted = Goal(goal, needs.idle, needs.after, needs.credit)
             most, labels = most_value(
@@ -256,7 +257,7 @@ class SatelliteRelaxation:
         return UNREACHED, None
 
     def _level_multiplier(self, weight: Ints) -> float:
-        """Return a level's multiplier in units, so that the least collect costs whole units."""
+        """Return a level's multiplier in units, so that the smallest collect costs whole units."""
         typical = float(weight[weight > 0].mean()) if np.any(weight > 0) else 0.0
         filled = self.levels.gain[self.levels.gain > 0]
         least = int(filled.min()) if len(filled) else 1
@@ -266,9 +267,9 @@ class SatelliteRelaxation:
 def _classes(
     problem: Problem, satellite: SatelliteProblem, network: Network, levels: DataLevels
 ) -> tuple[DataLevels, ...]:
-    """Return the levels with the last image in each span; see ``SatelliteRelaxation``.
+    """Return the levels for the last image in each span; see ``SatelliteRelaxation``.
 
-    A span is as long as telemetry takes to fill half of the smallest image.
+    A span is as long as telemetry takes to fill half as much as the smallest image.
     """
     if not network.must_deliver:
         return (levels,)
@@ -277,7 +278,7 @@ def _classes(
     telemetry_per_s = satellite.resources.telemetry_per_s
     length_s = np.inf
     if telemetry_per_s > 0.0 and is_image.any():
-        # Any length is a bound: shorter ones lose less of it to telemetry, and make more classes.
+        # Any length gives a bound: shorter ones lose less to telemetry, but make more classes.
         length_s = 0.5 * float(network.data_gain[is_image].min()) / telemetry_per_s
     is_shut = (network.is_contact == 0) & ~is_image & ~network.is_kept
     classes = []
@@ -288,27 +289,27 @@ def _classes(
         end = min(levels.end, int(levels.delivered[is_last].max()))
         classes.append(levels._replace(before=before, end=end))
         is_free, is_shut = is_free & ~is_last, is_shut | is_last
-    # With what must be taken alone everything may stay on board.
+    # If no images are taken but those that must be, everything may stay on board.
     before = np.where(is_shut, -1, levels.before).astype(np.int32)
     return (*classes, levels._replace(before=before))
 
 
 class _Needs(NamedTuple):
-    """The least energy to gain so much from each task on, where data has a multiplier.
+    """The least energy to gain each amount from each task on, with a multiplier for data.
 
-    At a multiplier for each level of the recorder images are worth less, and contacts what they
-    take down at most. That leaves the limits of the recorder out, and yet not for nothing: what is
-    gained from a level on is no more than that worth, and the multiplier of the levels that are
-    free.
+    At a multiplier for each level of the recorder images are worth less by the levels they fill,
+    and contacts are worth the most levels they can empty. The recorder's limits are left out, but
+    not ignored: from a level on, a path gains at most this worth plus the multipliers of the levels
+    that are free.
 
     Attributes
     ----------
     idle, after
         Tables of ``least_energy``.
     credit
-        What levels that are free add, for each level. Shape ``(num_levels,)``.
+        What the free levels add, for each level. Shape ``(num_levels,)``.
     top
-        No path gains more.
+        An upper bound on the gain of any path.
     """
 
     idle: Singles
@@ -333,7 +334,7 @@ class _Needs(NamedTuple):
             most = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
             if most < limit:
                 break
-            # Totals that no energy suffices for take memory, and next to no time.
+            # Totals that no energy suffices for take memory, but next to no time.
             limit = 4 * limit if near is None else int(1.5 * limit)
         return cls(idle=idle, after=after, credit=credit, top=most + at_start)
 
@@ -341,7 +342,7 @@ class _Needs(NamedTuple):
 def relaxations(
     problem: Problem, levels_per_collect: int = TUNING.fine
 ) -> tuple[SatelliteRelaxation, ...]:
-    """Return the programmes of all satellites that have anything to do."""
+    """Return the programmes of all satellites that have opportunities."""
     return tuple(
         SatelliteRelaxation.of(problem, satellite, levels_per_collect)
         for satellite in problem.satellites

@@ -1,4 +1,4 @@
-"""What images earn that stay on board, in the programme of one satellite."""
+"""What images that stay on board earn, in the programme of one satellite."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 class Shares:
     r"""What images lose by staying on board, as a multiplier of the data left at the end.
 
-    An image that stays is worth :math:`w_k - l_k` at the multipliers of the targets, one that comes
-    down :math:`w_k`. A recorder holds what was recorded last. For any instant :math:`T` either
-    something recorded before it stays, and then all images from there on do: a plan gains no more
-    than with :math:`w_k - l_k` for those. Or nothing does, and then the images that ended later
-    fill what the recorder holds at the end but for the telemetry since :math:`T`:
+    At the multipliers of the targets an image is worth :math:`w_k - l_k` if it stays, :math:`w_k`
+    if it comes down. What a recorder holds was recorded last. For any instant :math:`T` there are
+    two cases. Either something recorded before it stays, and so do all images after it: a plan
+    gains no more than with :math:`w_k - l_k` for those. Or nothing does, and images that ended
+    later make up what the recorder holds at the end, apart from the telemetry since :math:`T`:
     :math:`\sum_{stay} s_k \ge g`. For any :math:`\mu \ge 0` such a plan gains at most :math:`\sum_k
-    w_k` of the images before and :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` of those
-    after it.
+    w_k` by the images before and :math:`\sum_k \max(w_k, w_k - l_k + \mu s_k) - \mu g` by those
+    after :math:`T`.
 
     Attributes
     ----------
@@ -48,12 +48,12 @@ class Shares:
     held
         What the recorder holds at the start.
     typical
-        What an image on the ground is worth.
+        Median worth of an image on the ground.
     telemetry_per_s
         In recorder capacities.
     since_s, telemetry_since_s
-        Instants to tell the two cases apart, ascending, and since when telemetry may have been
-        recorded after them. Shape ``(k,)``.
+        Instants that may separate the two cases, ascending, and the instants since which telemetry
+        may have been recorded after them. Shape ``(k,)``.
     start_s, end_s
         Of each task, when it is recorded. Shape ``(m,)``.
     """
@@ -72,7 +72,7 @@ class Shares:
 
     @classmethod
     def of(cls, problem: Problem, satellite: SatelliteProblem, network: Network) -> Shares | None:
-        """Return them where they matter; None where a task may be a detour for others."""
+        """Return the shares; None if they do not matter or a task may be a detour for others."""
         if network.left_cost == 0.0 or not is_transitive_on(satellite):
             return None
         rows = satellite.rows
@@ -86,7 +86,7 @@ class Shares:
             )
         ]
         is_booked = problem.dynamics == "paper"
-        # Events book the telemetry since the one before them.
+        # An event books the telemetry since the event before it.
         events_s = np.concatenate([[0.0], satellite.event_s])
         before_s = events_s[np.searchsorted(satellite.event_s, since_s)]
         return cls(
@@ -109,7 +109,7 @@ class Shares:
         Parameters
         ----------
         gained_before
-            What the first case gains with each instant; the later, the more.
+            What the first case gains with each instant; the later the instant, the more.
         """
         low, high, gained = FROM_START, len(self.since_s), 0
         while high - low > 1:
@@ -122,22 +122,23 @@ class Shares:
         return low, gained
 
     def finer(self, unit: float) -> int:
-        """Return into how many parts a unit is to be cut where that takes little time."""
+        """Return into how many parts to divide a unit if that takes little time."""
         return int(np.ceil(TUNING.fine * unit / self.typical))
 
     def weights_before(self, weight: Ints, unit: float, since: int, finer: int) -> Ints:
-        """Return what images count in the first case, in so much finer units."""
+        """Return what images count in the first case, in units that are ``finer`` times smaller."""
         stays = self.start_s >= self.since_s[since] + TIME_TOLERANCE_S
         worth = np.where(stays, np.maximum(weight * unit - self.lost, 0.0), weight * unit)
         return np.ceil(worth * (finer / unit) - ROUNDING).astype(np.int32)
 
     def weights(self, weight: Ints, unit: float, since: int) -> Ints:
-        """Return what images count at most, in units, of what they are worth on the ground.
+        """Return the most that images count in the second case, in units.
 
-        With ``FROM_START`` as the instant that is so for all plans.
+        With ``FROM_START`` as the instant this holds for all plans. ``weight`` is the worth of
+        images on the ground.
         """
         worth = weight.astype(np.float64) * unit
-        # Contacts cost what their antennas do.
+        # Negative weights are what contacts pay for antennas.
         most = np.where(weight < 0, worth, self.worth_at_most(worth, since))
         return np.ceil(most / unit - ROUNDING).astype(np.int32)
 
@@ -147,11 +148,11 @@ class Shares:
         if since != FROM_START:
             may_stay = self.end_s > self.since_s[since] - TIME_TOLERANCE_S
             stays = np.where(may_stay, stays, 0.0)
-        # Whoever takes an image for nothing can do without.
+        # A plan that gains nothing by an image can do without it.
         return np.where((worth > 0.0) | self.is_kept, np.maximum(worth, stays), 0.0)
 
     def end_cost(self, levels: DataLevels, unit: float, since: int) -> Ints:
-        """Return what a recorder costs that ends at each level, in units."""
+        """Return the cost of ending with the recorder at each level, in units."""
         cost = np.floor(self.cost_at_end(levels, since) / unit)
         return np.minimum(cost, MAX_UNITS).astype(np.int32)
 

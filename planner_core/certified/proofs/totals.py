@@ -1,4 +1,4 @@
-r"""A bound from what a day's energy and downlink add up to, whatever the order of tasks.
+r"""A bound from the horizon's totals of energy and downlink, whatever the order of tasks.
 
 For each satellite let images take :math:`T` seconds in all and contacts :math:`C`. At the
 horizon's end the battery must be above its minimum and the recorder below its maximum, so
@@ -10,9 +10,9 @@ horizon's end the battery must be above its minimum and the recorder below its m
 
 with the drains of images and contacts, the charge :math:`c` in at most :math:`S` sunlit seconds of
 the :math:`H`, fill, telemetry, and the most :math:`W` that so many seconds of contacts take down:
-the passes one after another, those with the highest rate first. A battery that is full or a
-recorder that is empty only wastes. The greatest :math:`T` of all satellites together is a knapsack
-for the targets. Starts do not matter, so it holds for continuous ones too.
+the passes one after another, those with the highest rate first. A full battery or an empty recorder
+only wastes charge or contact time. The greatest :math:`T` of all satellites add up to the capacity
+of a knapsack of targets. Starts do not matter, so the bound holds for continuous ones too.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from planner_core.problem import (
 
 
 def totals_bound(problem: Problem) -> Bound | None:
-    """Return the bound; None without resources or where they count by events."""
+    """Return the bound; None without resources, or in dynamics other than ``physical``."""
     if not problem.use_resources or problem.dynamics != "physical":
         return None
     table = problem.opportunities
@@ -72,7 +72,7 @@ def _image_room_s(problem: Problem, satellite: SatelliteProblem) -> float:
             rooms.append((data + float(np.interp(used_s, contact_s, down))) / r.collect_fill_per_s)
         return min(rooms)
 
-    # Contacts make room on board and cost energy: the least of rising and falling lines.
+    # Contacts free the recorder and cost energy: the minimum of these limits is concave.
     low_s, high_s = 0.0, most_s
     for _ in range(100):
         third_s = (high_s - low_s) / 3.0
@@ -85,10 +85,10 @@ def _image_room_s(problem: Problem, satellite: SatelliteProblem) -> float:
 
 
 def _most_down(problem: Problem, satellite: SatelliteProblem) -> tuple[Floats, Floats]:
-    """Return seconds of contacts, ascending, and the most that so many of them take down.
+    """Return seconds of contacts, ascending, and the most data that so many seconds take down.
 
-    Of the contacts that one access offers only one is taken. It takes down no more than the
-    fullest of them, and no faster than the fastest.
+    Only one of the contacts that an access offers is taken. It takes down no more than the one
+    with the largest volume, and no faster than the fastest.
     """
     contacts = np.flatnonzero(satellite.kind == CONTACT)
     volume, length_s = satellite.volume[contacts], (satellite.end_s - satellite.start_s)[contacts]
