@@ -1,4 +1,4 @@
-"""Numbers that stand for something, where kernels have no other way to say it."""
+"""Numbers with a special meaning, for kernels that have no other way to express it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ UNASSIGNED: Final = -1
 ELSEWHERE: Final = -2
 """Another satellite images the target."""
 FIXED: Final = -3
-"""Another satellite must keep it."""
+"""Another satellite images the target, and must keep it."""
 
 NO_TASK: Final = -1
 AT_START: Final = -1
@@ -18,27 +18,27 @@ NOWHERE: Final = -2
 """There is no path, or none as good."""
 
 UNREACHED: Final = -1
-"""No path is worth the goal."""
+"""No path reaches the goal."""
 STOPPED: Final = -2
-"""The budget was spent before that was known."""
+"""The search was stopped before it was known whether a path reaches the goal."""
 
 FROM_START: Final = -1
 """The instant before all others."""
 
 NEVER: Final = float("-inf")
-"""Gain of what cannot be taken, or has been passed."""
+"""Gain of a task that cannot be taken, or has been passed."""
 
 ANY_LEVEL: Final = 2.0
-"""Of capacity: no limit."""
+"""A limit of twice the capacity: none."""
 
 ANYWHERE: Final = -2
-"""In place of the contact that a path has taken last: any of them, or none."""
+"""Instead of the contact that a path took last: any contact, or none."""
 
 UNREACHED_UNITS: Final = -(2**30)
-"""Instead of units that add up to fewer than ``sizes.MAX_UNITS``: below 0 with those too."""
+"""Worth where there is no path: below 0 even with ``sizes.MAX_UNITS`` added."""
 
 PLENTY_UNITS: Final = 2**30
-"""Units that suffice for anything: more than any path gains."""
+"""More units than any path gains."""
 
 UNKNOWN_UNITS: Final = -2
-"""Units that were not worked out."""
+"""Units that have not been computed."""

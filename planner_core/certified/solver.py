@@ -1,4 +1,4 @@
-"""A plan and a proof that close in on each other."""
+"""The certified solver: a plan and a proven bound that close in on each other."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ class Certified:
 
     @property
     def outlook(self) -> Outlook:
-        """Which actions it looks at."""
+        """Which actions the solver considers."""
         return Outlook()
 
     def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
-        """Return the best plan and its bound; the same for the same seed if time suffices."""
+        """Return the best plan and its bound; the same for the same seed, if time suffices."""
         effort = Effort(moves_per_task=self.moves_per_task)
         return solved(problem, budget, seed, self.gap, effort)

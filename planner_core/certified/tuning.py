@@ -1,9 +1,9 @@
-"""What steers the search of ``certified``: every constant that is neither a size nor a rounding.
+"""Constants that steer the search of ``certified``: all that are neither sizes nor tolerances.
 
-Whatever these values are, plans are judged by the referee and bounds are proven: they decide how
-soon both are good. ``python -m benchmarks.ablation --constants`` measures half and double of each
-under its name here, which is that of its row in docs/ablation.md. Sizes of tables are in ``sizes``,
-what counts as equal in ``tolerances``.
+Whatever these values are, plans are judged by the referee and bounds are proven: they only decide
+how soon both are good. ``python -m benchmarks.ablation --constants`` measures half and double of
+each, in a row of docs/ablation.md under the name used here. Sizes of tables are in ``sizes``, and
+what counts as equal is in ``tolerances``.
 """
 
 from __future__ import annotations
@@ -16,121 +16,121 @@ from typing import Any, Final
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tuning:
-    """The constants of the search. Shares are of what their names say, or of the word after them.
+    """The constants of the search.
 
     Attributes
     ----------
     tries
-        How often or on how many something is tried of which more hardly pays: sets of contacts
-        at a time, streams of a small fleet, programs without a better plan.
+        How often, or for how many, something is tried if more hardly pays: sets of contacts at a
+        time, streams of a small fleet, programs without a better plan.
     several
-        The same where each takes next to no time: orders of elimination, contacts as the last.
+        The same if each try takes next to no time: orders of elimination, contacts as the last.
     patience
-        How often in a row a search may lead to nothing better before it is done in another way.
+        How many times in a row a search may find nothing better before it is done in another way.
     rounds
-        Steps of a search that is asked for more than a moment's work; levels of noise.
+        Steps of a search that is to do more than a moment's work; levels of noise.
     fleet_patience
-        Turns of a fleet's searches without a better plan, before the solver ends; windows with free
+        Turns of a fleet's searches without a better plan before the solver ends; windows with free
         starts under resources.
 
     first_step_of_paths, first_step
-        How far multipliers move in the first epoch of an ascent on longest paths, or on chains in
-        wide cells of start times, and of any other, in shares of what targets are worth.
+        How far multipliers move in the first epoch, as a share of targets' worth: in an ascent on
+        longest paths, or on chains in wide cells of start times; in any other ascent.
     last_step, last_step_of_few
-        How far in the last one, as a share of that; and where epochs are few.
+        How far they move in the last epoch, as a share of that; the same if epochs are few.
     begin, begin_of_chains
-        The multipliers at first, as a share of what targets are worth; with continuous starts.
+        The initial multipliers, as a share of targets' worth; the same with continuous starts.
     newest_share
-        Of an epoch's multipliers in the mean.
+        Weight of an epoch's multipliers in the mean.
     moves_per_epoch
         How often multipliers move in an epoch, at most.
     epochs
-        After how many an ascent is settled; twice as many where each target is paid once in a pass.
+        Epochs after which an ascent is settled; twice as many if a target is paid once in a pass.
     quick_nodes
         Nodes of a network that the quick bound may visit; a million take about 0.1 s.
     epochs_at_a_time, many_epochs
-        Between two looks at the budget and the other searches; where an epoch takes no time.
+        Epochs between two checks of the budget and of other searches; if an epoch takes no time.
 
     deflection
         Share of the last direction in the next, in the ascent on exact programmes.
     shorter
-        What the length of steps is multiplied by where they no longer help.
+        Factor by which steps are shortened when they no longer help.
     far_above
-        Share of a bound: a plan or another bound that far away says little of the best plan.
+        Share of a bound: a plan or another bound that far away says little about the best plan.
     little
-        Share of a bound, a gap, a goal, a step or noise: what a move of it is at least.
+        Share of a bound, a gap, a goal, a step or noise: its smallest part that matters.
     worth_a_step
-        Share of a bound that a quick oracle must gain, for an exact one to be asked at all.
+        Share of a bound that must be gained for (further) exact evaluations to be worth their time.
     levels_per_collect
-        Parts of a typical collect, in energy or worth, where tables are small; half as many where
-        energy is an estimate.
+        Levels of energy or worth in a typical collect, if tables are small; half as many if energy
+        is an estimate.
     fine, coarse
-        Levels of the recorder that the smallest collect fills, where a proof counts and where many
-        multipliers are tried; the first also of energy, where contacts are named at first.
+        Levels of the recorder that the smallest collect fills: in proofs, and where many
+        multipliers are tried; ``fine`` also of energy, when contacts are first named.
     units_per_reward
-        In which exact programmes count a typical target's worth, where many multipliers are tried.
+        Units in a typical target's worth in exact programmes, if many multipliers are tried.
     max_units
         Units of worth that a bound by exact programmes may count.
     multiplier_shares
-        Of the multipliers by agility alone, at which resources are asked.
+        Shares of the multipliers by agility alone that are tried with resources.
     latency_work
-        Opportunities times rounds of a quick bound where images lose worth as they age; a second.
+        Opportunities times rounds of a quick bound if images lose worth as they age: a second.
     first_goal
-        Share of what the battery alone allows that an exact programme is asked for first.
+        Share of the gain that the battery alone allows that an exact programme first aims for.
 
     widths_s
         The narrowest and the widest cells of start times.
     longest_piece_s
-        Of a day, that is bounded as a whole with continuous starts.
+        Longest piece of a day that is bounded as a whole with continuous starts.
     tidy_s
-        What a label's second is worth less than a target for; and what separates two pieces.
+        Seconds of an earlier start that outweigh a target in a label; clear time between pieces.
     beginning
-        Of time or moves, for what other searches only begin with (for plans of one satellite
-        without its half-life, too), and for multipliers with a half-life at a time.
+        Share of time or moves for searches that others only begin with (also for plans of one
+        satellite without its half-life), and for multipliers with a half-life at a time.
 
     window_tasks
         Tasks between which a window lies, at least and at most.
     aimed
-        Share of moves that begin at a target that nobody images.
+        Share of moves that begin at an unassigned target.
     trials
-        Draws to find such a target where they matter, or a task that fits.
+        Draws to find such a target under resources, or a task that fits.
     tie
-        Of a target's worth, by which equal targets are told apart at random.
+        Share of a target's worth by which equal targets are distinguished at random.
     trifle
-        Of a target's worth, that is as good as nothing.
+        Share of a target's worth that counts as nothing.
     moves_at_a_time, moves_in_a_step
-        Of the window search between two looks at the budget; and under resources.
+        Moves of the window search between two checks of the budget; the same under resources.
     moves_per_task
-        Of the window search in a turn; ``little`` of them beside an ascent on passes. Of a step
-        under resources, at most.
+        Moves of the window search in a turn, for each task (``little`` of them beside an ascent on
+        passes). Under resources, the most in a step.
     disturbance
         Largest share of a plan, or of multipliers, that a random move changes.
 
     near
         Share of a reward that a task may cost and yet be in the best plans.
     room, tight
-        Of a typical target: with less room than ``room`` above the plan the next image is hard to
-        find, and is looked for when multipliers get no lower (with half a target, 500 targets and
-        turns to the sun: 26 CPU s for nothing, 1.25 % after 20 s instead of 0.42); two values
-        within ``tight`` are the same. As a share of what batteries alone allow: with more than
-        ``tight`` above the plan a fleet's recorders are full (docs/bounds.md).
+        In typical targets: if the bound is less than ``room`` above the plan, the next image is
+        hard to find, and is sought when multipliers get no lower (with half a target, 500 targets
+        and turns to the sun: 26 CPU s for nothing, 1.25 % after 20 s instead of 0.42); two values
+        within ``tight`` are the same. As a share of the bound by batteries alone: if it is more
+        than ``tight`` above the plan, a fleet's recorders are full (docs/bounds.md).
     open_tasks
-        Of a program with fixed contacts, and of one replanned day, at first.
+        Tasks of a program with fixed contacts, and of one replanned day, at first.
     more
-        By what factor more are offered where that finds nothing.
+        Factor by which more are offered if that finds nothing.
     tasks_per_task
-        Offered to a fleet's program, for each that the plan takes, at first.
+        Tasks offered to a fleet's program at first, for each that the plan takes.
     large, small_fleet
-        Opportunities above which steps with resources take long; up to which a fleet without them
-        is planned in streams and ends with cutting planes.
+        Opportunities above which steps with resources take long; up to which a fleet without
+        resources is planned in streams and ends with cutting planes.
     dense
         Images of a satellite that turns to the sun above which whole days move them, not windows.
     most_columns, most_relaxed
-        Tasks of a mixed-integer program, and of a relaxation without energy levels.
+        Tasks of a mixed-integer program, and of a relaxation without energy levels, at most.
     steps_beside
-        Steps of the search for plans while another one has its turn.
+        Steps of the search for plans while another search has its turn.
     preference
-        For targets of a large fleet that are hard to have, as a share of their worth.
+        For targets of a large fleet that are hard to image, as a share of their worth.
     highs_nodes, highs_effort
         Nodes of a HiGHS search that only seeks plans, and its share of work on heuristics.
     max_cuts
@@ -204,16 +204,16 @@ class Tuning:
 
 
 TUNING: Final = Tuning()
-"""The values in force. Kernels freeze what they read when they are compiled."""
+"""The values in force. Kernels keep the values that they read when they were compiled."""
 
 
 def tune(**changes: Any) -> None:
-    """Steer by other values from now on, in all threads.
+    """Use other values from now on, in all threads.
 
     Raises
     ------
     AttributeError
-        Where there is no such value.
+        If there is no such value.
     """
     for name, value in changes.items():
         getattr(TUNING, name)
@@ -222,7 +222,7 @@ def tune(**changes: Any) -> None:
 
 @contextmanager
 def tuned(**changes: Any) -> Iterator[None]:
-    """Steer by other values within: for measurements and tests."""
+    """Use other values within the context, for measurements and tests."""
     before = {name: getattr(TUNING, name) for name in changes}
     try:
         tune(**changes)

@@ -132,10 +132,9 @@ class Shares:
         return np.ceil(worth * (finer / unit) - ROUNDING).astype(np.int32)
 
     def weights(self, weight: Ints, unit: float, since: int) -> Ints:
-        """Return the most that images count in the second case, in units.
+        """Return the most that images of this worth count in the second case, in units.
 
-        With ``FROM_START`` as the instant this holds for all plans. ``weight`` is the worth of
-        images on the ground.
+        With ``FROM_START`` as the instant this holds for all plans.
         """
         worth = weight.astype(np.float64) * unit
         # Negative weights are what contacts pay for antennas.
