@@ -27,9 +27,8 @@ class Bound:
     is_elementary
         Whether ``elementary_value`` checks the multipliers.
     contact_multipliers
-        One for each contact: with ``multipliers`` they prove a bound with a half-life
-        (``latency.latency_value``); all 0 if batteries alone prove one without a half-life. Shape
-        ``(num_contacts,)``.
+        One for each contact: with ``multipliers`` they prove a bound with a half-life, or with all
+        0 one without, by batteries alone (``latency.latency_value``). Shape ``(num_contacts,)``.
     antenna_multipliers
         With ``multipliers`` they prove a bound by dynamic programmes if satellites want the same
         antennas (``planner_core.precedence.antennas``). Shape ``(num_groups,)``.

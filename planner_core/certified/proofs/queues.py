@@ -55,8 +55,7 @@ def queue_value(
     contact_multipliers
         Multipliers as for ``latency_value``. Shape ``(num_contacts,)``.
     exact_contacts
-        Rows of contacts whose energy is not rounded. All others' is, in the satellite's favour,
-        except for opportunities that must be taken.
+        Rows of contacts whose energy is not rounded in the satellite's favour (as with kept rows).
     """
     multiplier = surplus(multipliers, problem.best_worth)
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
