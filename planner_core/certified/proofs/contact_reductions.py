@@ -1,7 +1,7 @@
 """Which contacts may follow each other in plans worth more than some level, by multipliers.
 
 A forward and a backward pass at multipliers of contacts (``LatencyRelaxation.most_by_pairs``) bound
-each pair of contacts that directly follow each other. No such plan has pairs not above the level.
+each pair of contacts that directly follow each other: pairs not above it are in no such plan.
 """
 
 from __future__ import annotations
