@@ -7,9 +7,10 @@ multipliers settles far sooner than they do (an incremental subgradient method, 
 2001). Now and then all parts are evaluated at this mean, which proves a bound.
 
 An oracle defines the parts and how each one answers: longest paths (``paths``), paths that remember
-targets (``elementary``), batteries (``energy``), recorders (``data``), chains with free starts
-(``chains``), queues (``queues``). The exact programmes of ``resources`` take seconds for an answer
-and have too few parts for this: they take longer steps, whose length depends on the bound's value.
+targets (``elementary``), batteries (``energy``), recorders (``data``), chains with continuous
+starts (``chains``), queues (``queues``). The exact programmes of ``resources`` take seconds for an
+answer and have too few parts for this: they take longer steps, whose length depends on the bound's
+value.
 """
 
 from __future__ import annotations
