@@ -1,4 +1,4 @@
-"""The frozen problem, all that a solver and the referee ever see, and what it is made of."""
+"""The frozen problem that solvers and the referee see, and the types it consists of."""
 
 from planner_core.problem.columns import (
     ACCESS_FOUND,

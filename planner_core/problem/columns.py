@@ -1,4 +1,4 @@
-"""What the columns of a problem are made of: kinds of arrays, tasks and missed targets."""
+"""Array types of a problem's columns, kinds of tasks, and why targets have no opportunity."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NEVER_VISIBLE: Final = 1
 OUTSIDE_LIMITS: Final = 2
 ACCESS_TOO_SHORT: Final = 3
 RULED_OUT: Final = 4
-"""Geometry would allow it; what the scenario pins, or what is out, leaves no opportunity."""
+"""Geometry allows it, but pins, outages or the first turn leave no opportunity."""
 WRONG_SENSOR_TYPE: Final = 5
 OUTSIDE_TIMES: Final = 6
 """An access is long enough, but not between the target's release and due times."""

@@ -1,4 +1,4 @@
-"""What images can earn at most, where it counts when they are on the ground."""
+"""The most that images can earn if the objective counts when they reach the ground."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _ROUNDING_S: Final = 1e-5  # the referee forgives a recorder 1e-9 of its capacit
 
 
 def with_objective(problem: Problem, objective: Objective) -> Problem:
-    """Return the problem under an objective, with the most that each image can earn.
+    """Return the problem with an objective, each worth lowered to the most the image can earn.
 
     Parameters
     ----------
     problem
-        One in which images earn all when they are taken.
+        Its images earn their whole worth when they are taken.
     """
     if not problem.use_resources or not objective.counts_delivery:
         return problem
@@ -32,13 +32,13 @@ def with_objective(problem: Problem, objective: Objective) -> Problem:
 
 
 def without_half_life(problem: Problem) -> Problem:
-    """Return the problem whose images keep their worth however late they come down."""
+    """Return the problem with images that keep their worth however late they come down."""
     plain = replace(problem, worth=problem.worth_on_ground, full_worth=None)
     return with_objective(plain, replace(problem.objective, half_life_s=None))
 
 
 def lost_on_board(problem: Problem) -> Floats:
-    """Return what each image earns less than its worth if it stays on board. Shape ``(n,)``."""
+    """Return how much of its worth each image loses if it stays on board. Shape ``(n,)``."""
     if not problem.counts_delivery:
         return np.zeros(len(problem.worth))
     on_board = problem.objective.collected_share * problem.worth_on_ground
@@ -46,11 +46,11 @@ def lost_on_board(problem: Problem) -> Floats:
 
 
 def least_age_s(problem: Problem) -> Floats:
-    """Return the age at which each image is on the ground at the earliest, whatever else is done.
+    """Return a lower bound on each image's age when it is on the ground, whatever else is done.
 
-    That is where the first contact after it takes down nothing but this image. Infinite where no
-    contact follows, and for contacts. With continuous starts it holds for each start in the
-    access. Shape ``(n,)``.
+    It assumes that the first contact to be set up after it takes down nothing but this image.
+    Infinite if no contact follows, and for contacts. With continuous starts it holds for every
+    start in the access. Shape ``(n,)``.
     """
     table = problem.opportunities
     first_end_s, last_end_s = table.end_s, table.end_s
@@ -70,7 +70,7 @@ def least_age_s(problem: Problem) -> Floats:
 def _first_down_s(
     problem: Problem, satellite: SatelliteProblem, end_s: Floats, length_s: Floats
 ) -> Floats:
-    """Return when images that end then can be down; infinite for never."""
+    """Return when images of these ends and lengths may be down; infinite for never."""
     r, links = satellite.resources, problem.downlinks
     contacts = np.flatnonzero(satellite.kind == CONTACT)
     contacts = contacts[np.argsort(satellite.start_s[contacts], kind="stable")]
@@ -79,7 +79,7 @@ def _first_down_s(
         return np.full(len(end_s), np.inf)
     starts_s = satellite.start_s[contacts]
     ready_s = starts_s + links.stations.setup_s[satellite.site[contacts]]
-    # Of the contacts from each on, the first that is set up.
+    # For each contact, the earliest end of setup among it and all later ones.
     ready_s = np.append(np.minimum.accumulate(ready_s[::-1])[::-1], np.inf)
     following = np.searchsorted(starts_s, end_s - TIME_TOLERANCE_S)
     down_s = ready_s[following] + length_s * r.collect_fill_per_s / fastest_per_s

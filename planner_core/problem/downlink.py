@@ -1,7 +1,7 @@
-"""What contacts take down: a rate over time for the referee, one number each for solvers.
+"""The data that contacts take down: a rate over time for the referee, one volume for solvers.
 
-Where the rate follows the elevation it is known at instants of each pass, and linear between them.
-Both the referee and the solvers count with that same rate; each adds it up in its own way.
+If the rate follows the elevation, it is known at instants of each pass and linear between them.
+The referee and the solvers use the same rate, but each integrates it in its own way.
 """
 
 from __future__ import annotations
@@ -24,21 +24,22 @@ Longs = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PassRate:
-    """How fast data comes down during one access to a station, setup aside.
+    """How fast data comes down during one access to a station, setup ignored.
 
     Attributes
     ----------
     time_s
         Instants from the first to the last of the access, ascending. Shape ``(k,)``.
     per_s
-        Rates there, in recorder capacities per second; linear between. Shape ``(k,)``.
+        Rates at these instants, in recorder capacities per second; linear between them.
+        Shape ``(k,)``.
     """
 
     time_s: Floats
     per_s: Floats
 
     def until(self, t_s: Floats) -> Floats:
-        """Return what comes down from the first instant until each of these.
+        """Return how much comes down from the first instant until each of these.
 
         >>> rate = PassRate(time_s=np.array([0.0, 2.0, 4.0]), per_s=np.array([1.0, 3.0, 3.0]))
         >>> rate.until(np.array([1.0, 2.0, 4.0]))
@@ -64,32 +65,32 @@ class PassRate:
         first = self.per_s[at]
         rise = (self.per_s[at + 1] - first) / steps_s[at]
         missing = np.maximum(amount - whole[at], 0.0)
-        # The quadratic's root in the form that holds where the rate stays the same, too.
+        # This form of the quadratic's root also holds if the rate is constant.
         until = first + np.sqrt(np.maximum(first**2 + 2.0 * rise * missing, 0.0))
         into_s = np.divide(2.0 * missing, until, out=np.zeros_like(missing), where=until > 0.0)
         return np.asarray(self.time_s[at] + np.minimum(into_s, steps_s[at]))
 
     @cached_property
     def _added_up(self) -> tuple[Floats, Floats]:
-        """Return the seconds between the instants, and what has come down at each instant."""
+        """The seconds between the instants, and the amount that has come down by each instant."""
         steps_s = np.diff(self.time_s)
         parts = steps_s * (self.per_s[1:] + self.per_s[:-1]) / 2
         return steps_s, np.concatenate([[0.0], np.cumsum(parts)])
 
 
 class PassRates(NamedTuple):
-    """The rates of many passes, one after another: what ``PassRate`` says of one, of all at once.
+    """Many passes' ``PassRate`` in joined arrays, for batched queries.
 
-    A fleet has thousands of passes, and each of them is asked a few times.
+    A fleet has thousands of passes, and each of them is queried only a few times.
 
     Attributes
     ----------
     time_s, per_s
-        As of each pass. Shape ``(n,)``.
+        As in ``PassRate``, one pass after another. Shape ``(n,)``.
     first
-        Where each pass begins, and ``n``. Shape ``(num_passes + 1,)``.
+        Index at which each pass begins, and ``n``. Shape ``(num_passes + 1,)``.
     whole
-        What has come down of its pass at each instant. Shape ``(n,)``.
+        How much has come down in the pass by each instant. Shape ``(n,)``.
     """
 
     time_s: Floats
@@ -99,14 +100,14 @@ class PassRates(NamedTuple):
 
     @classmethod
     def joined(cls, rates: Sequence[PassRate]) -> PassRates:
-        """Return these passes in their order."""
+        """Return these passes, joined in order."""
         first = np.cumsum([0, *(len(rate.time_s) for rate in rates)])
         time_s = np.concatenate([np.empty(0), *(rate.time_s for rate in rates)])
         return cls.of(time_s, np.concatenate([np.empty(0), *(r.per_s for r in rates)]), first)
 
     @classmethod
     def of(cls, time_s: Floats, per_s: Floats, first: Longs) -> PassRates:
-        """Return the passes whose rates these are."""
+        """Return the passes with these rates."""
         return cls(time_s, per_s, first, _added_up(time_s, per_s, first))
 
     def each(self) -> list[PassRate]:
@@ -117,7 +118,7 @@ class PassRates(NamedTuple):
         ]
 
     def until(self, which: Longs, t_s: Floats) -> Floats:
-        """Return what comes down in each of these passes until an instant of its own."""
+        """Return how much comes down in each of these passes until an instant of its own."""
         return _until(self.time_s, self.per_s, self.first, self.whole, which, t_s)
 
     def when(self, which: Longs, amount: Floats) -> Floats:
@@ -171,14 +172,14 @@ def _when(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StationLinks:
-    """What each station does to a downlink. Shape ``(num_stations,)``.
+    """How each station affects a downlink. Shape ``(num_stations,)``.
 
     Attributes
     ----------
     gain
         Factor on the satellite's rate.
     setup_s
-        At the beginning of each contact, in which nothing comes down.
+        Time at the beginning of each contact in which nothing comes down.
     """
 
     gain: Floats
@@ -199,8 +200,8 @@ class Downlinks:
     stations
         Gain and setup.
     passes
-        The rate over each access where it follows the elevation, gain included, by the access's
-        number. Elsewhere the satellite's own rate holds, times the station's gain.
+        By access number, the rate of each access whose rate follows the elevation, gain included.
+        For all others the satellite's own rate holds, times the station's gain.
     """
 
     stations: StationLinks
@@ -209,12 +210,12 @@ class Downlinks:
     def volumes(
         self, rate_per_s: float, access: Ints, station: Ints, start_s: Floats, end_s: Floats
     ) -> Floats:
-        """Return what each contact of a satellite takes down, in recorder capacities.
+        """Return how much each contact of a satellite takes down, in recorder capacities.
 
         Parameters
         ----------
         rate_per_s
-            Of the satellite, where no elevation counts.
+            The satellite's own rate, which holds if the rate does not follow the elevation.
         access, station, start_s, end_s
             Of its contacts. Shape ``(n,)`` each.
         """
@@ -229,7 +230,7 @@ class Downlinks:
         return np.asarray(volume)
 
     def which(self, access: Ints) -> Longs:
-        """Return which of ``rates`` each access has; -1 where the satellite's own rate holds."""
+        """Return each access's index in ``rates``; -1 if the satellite's own rate holds."""
         if not self.passes:
             return np.full(len(access), -1)
         at = np.minimum(np.searchsorted(self._numbers, access), len(self._numbers) - 1)
@@ -237,12 +238,12 @@ class Downlinks:
 
     @cached_property
     def rates(self) -> PassRates:
-        """All passes, by the numbers of their accesses."""
+        """All passes, in order of their access numbers."""
         return PassRates.joined([self.passes[number] for number in self._numbers.tolist()])
 
     @cached_property
     def fastest_per_s(self) -> Floats:
-        """The highest of each of these rates. Shape ``(num_passes,)``."""
+        """The highest rate of each pass. Shape ``(num_passes,)``."""
         return np.asarray(np.maximum.reduceat(self.rates.per_s, self.rates.first[:-1]))
 
     @cached_property

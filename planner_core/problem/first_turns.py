@@ -1,8 +1,8 @@
-"""The turn from where a satellite looks at the start to its tasks.
+"""The turn from where a satellite looks at the start of the horizon to its tasks.
 
-It is asked of every task, not of the first alone: a task that follows another one begins later
-still. Only a satellite that tracks faster than it turns could reach one sooner by way of others;
-such plans are left out, and the referee does not accept them.
+Every task must leave time for it, not only the first: a task that follows others begins later
+anyway. Only a satellite that tracks faster than it slews could reach a task sooner by way of
+others; such plans are left out, and the referee does not accept them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from planner_core.problem.transitions import Transitions
 
 
 def too_soon(problem: Problem) -> Bools:
-    """Return the opportunities that no satellite can have turned to in time. Shape ``(n,)``."""
+    """Return which opportunities their satellite cannot turn to in time. Shape ``(n,)``."""
     found = np.zeros(len(problem.opportunities), dtype=np.bool_)
     for satellite in problem.satellites:
         if satellite.heading is not None:
@@ -41,7 +41,7 @@ def _too_soon(satellite: SatelliteProblem, heading: Heading) -> Bools:
 
 
 def _near(satellite: SatelliteProblem, heading: Heading) -> Ints:
-    """Return the local rows that the longest turn might be too long for."""
+    """Return the local rows that start before even the longest first turn would end."""
     tasks = satellite.transitions
     longest_s = tasks.slews.longest_s
     if tasks.is_moving:
@@ -51,7 +51,7 @@ def _near(satellite: SatelliteProblem, heading: Heading) -> Ints:
 
 
 def _from_heading(tasks: Transitions, heading: Heading, rows: Ints) -> Transitions:
-    """Return some tasks after one of no length that looks where the satellite does."""
+    """Return some tasks, preceded by one of zero length that looks along the heading."""
     at_s, look = np.array([heading.free_from_s]), np.array([heading.line_of_sight])
     moving = np.array([heading.moving_deg_s]) if tasks.is_moving else np.empty((0, 3))
     own = rows if tasks.is_moving else rows[:0]
@@ -66,10 +66,10 @@ def _from_heading(tasks: Transitions, heading: Heading, rows: Ints) -> Transitio
 
 
 def first_start_s(problem: Problem, row: int, open_s: float, close_s: float) -> float:
-    """Return the first whole millisecond at which a task can have been turned to.
+    """Return the first whole millisecond at which a task can start after the first turn.
 
-    Between ``open_s`` and ``close_s``, infinite where there is none. While lines of sight turn more
-    slowly than the satellite, whatever is late enough stays so later on.
+    It lies between ``open_s`` and ``close_s``; infinite if there is none. While lines of sight turn
+    more slowly than the satellite, every start after a feasible one is feasible too.
     """
     satellite = problem.satellites[int(problem.opportunities.satellite[row])]
 
@@ -85,7 +85,7 @@ def first_start_s(problem: Problem, row: int, open_s: float, close_s: float) -> 
 
 
 def _turned_s(problem: Problem, satellite: SatelliteProblem, row: int, start_s: float) -> float:
-    """Return when a satellite can look where an opportunity's task looks at some start."""
+    """Return when a satellite can have turned to a task's line of sight at ``start_s``."""
     heading, agility = satellite.heading, satellite.agility
     if heading is None:
         return -math.inf

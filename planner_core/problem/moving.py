@@ -1,9 +1,9 @@
-"""The time to turn between two lines of sight that move, within rate and acceleration.
+"""The time to turn between two moving lines of sight, within rate and acceleration limits.
 
-A satellite that images tracks its target, and so ends one task and begins the next with a rate of
-its own. The turn is a burst from the first rate to a cruise rate, a coast, and a burst to the last
-rate. Both bursts take the acceleration limit, and rotations are added as vectors, which makes
-it an upper value, by a few per cent for large angles.
+A satellite that images tracks its target, so it ends one task and begins the next while rotating.
+The turn is a burst from the first rate to a cruise rate, a coast, and a burst to the last rate.
+Both bursts use the full acceleration. Rotations are added as vectors, which overestimates the
+time, by a few per cent for large angles.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ _MOST_STEPS: Final = 60
 _SETTLED: Final = 1e-9  # deg/s
 _SLOWER: Final = 1e-4  # of the rate limit
 _ACCURACY_S: Final = 1e-6
-_MOST_RATES: Final = 5.0  # rate over acceleration: to brake, to turn by way of rest, and to go on
+_MOST_RATES: Final = 5.0  # rate / acceleration: to brake, turn from rest to rest and speed up
 
 
 @kernel
 def longest_turn_s(rate_deg_s: float, acceleration_deg_s2: float) -> float:
-    """Return a time in which every turn fits, whatever the rates at its ends."""
+    """Return a time that suffices for every turn, whatever the rates at its ends."""
     return 180.0 / rate_deg_s + _MOST_RATES * rate_deg_s / acceleration_deg_s2
 
 
 @borrowing
 def rotation_deg(u: Vector, v: Vector) -> Vector:
-    """Return the least rotation that brings one unit vector to another, along its axis."""
+    """Return the smallest rotation from one unit vector to another, as a vector along its axis."""
     x = u[1] * v[2] - u[2] * v[1]
     y = u[2] * v[0] - u[0] * v[2]
     z = u[0] * v[1] - u[1] * v[0]
@@ -47,7 +47,7 @@ def turns_in(
     room_s: float, turn: Vector, rate_from: Vector, rate_to: Vector,
     rate_deg_s: float, acceleration_deg_s2: float,
 ) -> bool:  # fmt: skip
-    """Return whether a satellite can turn in some time, with these rates at both ends.
+    """Return whether a satellite can turn in ``room_s``, with these rates at both ends.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def turns_in(
 
     Notes
     -----
-    The cruise rate that covers the rotation is a fixed point. Near the least time it may not be
-    found: then there is no turn.
+    The cruise rate that covers the rotation is a fixed point. Near the least time the iteration
+    may not converge; the answer is then no.
     """
     if room_s <= 0.0:
         return False
@@ -71,7 +71,7 @@ def turns_in(
         cruise_s = room_s - 0.5 * (first_s + last_s)
         if cruise_s <= 0.0:
             return False
-        # What is left for the cruise, from the middle of each burst on.
+        # The rate that the cruise needs, measured from mid-burst to mid-burst, minus ``c``.
         step = (
             (turn[0] - 0.5 * (first_s * rate_from[0] + last_s * rate_to[0])) / cruise_s - c[0],
             (turn[1] - 0.5 * (first_s * rate_from[1] + last_s * rate_to[1])) / cruise_s - c[1],
@@ -92,10 +92,10 @@ def turns_in(
 
 @borrowing_inner
 def _secant(step: Vector, before: Vector) -> float:
-    """Return how much of the last change to take back, so that the next step is least.
+    """Return which share of the last change to undo so that the next step is smallest.
 
-    Anderson's acceleration with one step of memory. Near the least time of a turn two cruise
-    rates fall together, and plain steps would hardly come nearer.
+    This is Anderson acceleration with one step of memory. Near the least time of a turn two
+    cruise rates coincide, and plain fixed-point steps would hardly converge.
     """
     x, y, z = step[0] - before[0], step[1] - before[1], step[2] - before[2]
     size = x * x + y * y + z * z
@@ -109,7 +109,7 @@ def moving_turn_s(
     turn: Vector, rate_from: Vector, rate_to: Vector,
     rate_deg_s: float, acceleration_deg_s2: float,
 ) -> float:  # fmt: skip
-    """Return the least time of such a turn, to a microsecond or so; see ``turns_in``.
+    """Return the least time of a turn, to about a microsecond; see ``turns_in``.
 
     >>> round(moving_turn_s((30.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, 0.5), 3)
     32.0
@@ -118,7 +118,7 @@ def moving_turn_s(
     """
     low_s, high_s = 0.0, longest_turn_s(rate_deg_s, acceleration_deg_s2)
     cruising_s = _cruising_turn_s(turn, rate_from, rate_to, rate_deg_s, acceleration_deg_s2)
-    # Where bursts are long a slower cruise may be sooner there.
+    # If the bursts are long, a turn with a slower cruise may take less time.
     slower = (1.0 - _SLOWER) * rate_deg_s
     slower_s = _cruising_turn_s(turn, rate_from, rate_to, slower, acceleration_deg_s2)
     enough_s = cruising_s + 0.5 * _ACCURACY_S
@@ -140,10 +140,10 @@ def _cruising_turn_s(
     turn: Vector, rate_from: Vector, rate_to: Vector,
     rate_deg_s: float, acceleration_deg_s2: float,
 ) -> float:  # fmt: skip
-    """Return the time of such a turn that cruises at a rate; negative where none does.
+    """Return the time of a turn that cruises at ``rate_deg_s``; negative if none is found.
 
-    All but short turns cruise at the rate limit. Of the cruise only the direction is unknown then,
-    and that is nearly the turn's: it is found in a few steps, where halving would take a hundred.
+    All but short turns cruise at the rate limit. Then only the cruise's direction is unknown, which
+    is close to the turn's: a few steps find it, whereas bisection would take a hundred.
     """
     length = _distance(turn, (0.0, 0.0, 0.0))
     left = turn
@@ -154,7 +154,7 @@ def _cruising_turn_s(
         c = share * left[0], share * left[1], share * left[2]
         first_s = _distance(c, rate_from) / acceleration_deg_s2
         last_s = _distance(c, rate_to) / acceleration_deg_s2
-        # What the cruise turns by, which goes on to the middle of each burst.
+        # The cruise's rotation, measured from mid-burst to mid-burst.
         left = (
             turn[0] - 0.5 * (first_s * rate_from[0] + last_s * rate_to[0]),
             turn[1] - 0.5 * (first_s * rate_from[1] + last_s * rate_to[1]),

@@ -1,8 +1,8 @@
-"""Images that recorders hold when the horizon begins, and what they can earn at most.
+"""Images that recorders hold when the horizon begins, and the most that they can still earn.
 
-What they earned when they were taken is past. What is left is their delivery, ``(1 - a)`` of their
-worth, less the later they come down. No search and no dual function counts it: it is added to what
-new images earn, in the plan as the referee finds it, in the bound as the most that contacts allow.
+What they earned when they were taken is past. Only their delivery still earns: ``(1 - a)`` of their
+worth, less the later they come down. No search or dual function counts this. It is added to what
+new images earn: in plans as the referee finds it, in the bound as the most that contacts allow.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from planner_core.problem.problem import ImageOnBoard, Problem, SatelliteProblem
 from planner_core.worth import delivery_share
 
 _ROUNDING_S: Final = 1e-5  # as of new images (``delivery.least_age_s``)
-_ROUNDING: Final = 2e-9  # of a recorder, which the referee forgives
+_ROUNDING: Final = 2e-9  # share of a recorder that the referee forgives
 
 
 def with_on_board(problem: Problem, images: tuple[ImageOnBoard, ...]) -> Problem:
-    """Return the problem with images on board; new ones of their targets earn nothing."""
+    """Return the problem with images on board; new images of their targets earn nothing."""
     if not images:
         return problem
     problem = replace(problem, on_board=images)
@@ -35,14 +35,14 @@ def with_on_board(problem: Problem, images: tuple[ImageOnBoard, ...]) -> Problem
 
 
 def imaged_before(problem: Problem) -> Bools:
-    """Return the collects of targets that have an image from before. Shape ``(n,)``."""
+    """Return which rows collect a target imaged before the horizon. Shape ``(n,)``."""
     table = problem.opportunities
     targets = [image.target for image in problem.on_board]
     return np.asarray((table.kind == COLLECT) & np.isin(table.site, targets))
 
 
 def without_on_board(problem: Problem) -> Problem:
-    """Return the problem in which new images alone earn anything."""
+    """Return the problem without images on board, so that only new images earn anything."""
     return replace(problem, on_board=()) if problem.on_board else problem
 
 
@@ -65,10 +65,10 @@ def most_on_board(problem: Problem) -> float:
 
 
 def _earliest_down_s(problem: Problem, satellite: SatelliteProblem, queued: Floats) -> Floats:
-    """Return when so much is down if all contacts are taken; infinite for never.
+    """Return lower bounds on when these amounts can be down; infinite for never.
 
-    Each pass counts with the part of it that takes down most, at once where it is set up first;
-    its last piece takes as long as at the highest rate.
+    All passes are taken. Each delivers the volume of its largest contact, all of it at the earliest
+    end of its contacts' setup; only the last piece takes time, at the highest rate of any contact.
     """
     contacts = np.flatnonzero(satellite.kind == CONTACT)
     if len(contacts) == 0:
@@ -89,6 +89,6 @@ def _earliest_down_s(problem: Problem, satellite: SatelliteProblem, queued: Floa
     missing = np.maximum(queued - _ROUNDING - np.append(0.0, taken)[at], 0.0)
     fastest_per_s = fastest_downlink_per_s(problem, satellite, contacts)
     takes_s = missing / max(fastest_per_s, 1e-12)
-    # By then the next pass may have begun to help.
+    # The next pass may be ready by then and deliver the rest.
     down_s = np.minimum(ready_s[at] + takes_s, np.append(ready_s, np.inf)[at + 1])
     return np.where(is_down, down_s, np.inf)

@@ -1,4 +1,4 @@
-"""What a scenario pins, and what is out, in terms of its problem."""
+"""A scenario's pins and outages in terms of its problem."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Blocked:
     Attributes
     ----------
     satellite, station
-        Whose span it is: an index of the scenario's satellites, or of its stations.
+        Index of the satellite, or of the station, that the span concerns.
     pointer
-        The pin or the outage that says so.
+        The pin or the outage that says so (JSON pointer).
     """
 
     start_s: float
@@ -39,7 +39,7 @@ class Blocked:
 
     @property
     def is_outage(self) -> bool:
-        """Whether it is a fact that was reported, and not an operator's wish."""
+        """Whether it is a reported fact rather than an operator's wish."""
         return self.pointer.startswith("/outages/")
 
     def concerns(self, satellite: int, kind: int, site: int) -> bool:
@@ -53,21 +53,21 @@ class Blocked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pinned:
-    """What the scenario pins, and what is out, in terms of the problem.
+    """The scenario's pins and outages in terms of the problem.
 
     Attributes
     ----------
     blocked
         Spans that pins block, and outages.
     skipped
-        Rows that no plan may take, as long as they are in the table, and the pin that says so.
+        Rows still in the table that no plan may take, each with the pin that says so.
     forbidden
         Targets that no plan may collect.
     struck
         The collects that were ruled out.
     frozen_until_s
-        What starts before it is kept or not taken at all; None where the plan follows no other
-        one.
+        Tasks that start before it are kept or cannot be taken; None unless the plan follows
+        another one.
     """
 
     kept: tuple[Kept, ...] = ()

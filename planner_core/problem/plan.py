@@ -1,4 +1,4 @@
-"""Plans: what a solver answers, before anyone has judged it."""
+"""Plans: a solver's answer, before the referee has judged it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from planner_core.problem import Bools, Floats, Longs, Problem
 class Action(NamedTuple):
     """One task: an opportunity of the problem, taken from ``start_s`` to ``end_s``.
 
-    A tuple: a search makes, sorts and compares them by the thousand.
+    It is a tuple because searches make, sort and compare thousands of them.
     """
 
     start_s: float
@@ -41,12 +41,12 @@ class Columns:
         return cls(row=row.astype(np.int64), start_s=start_s, end_s=end_s)
 
     def at(self, which: Bools | Longs | slice) -> Columns:
-        """Return some of them."""
+        """Return some of the actions."""
         return Columns(row=self.row[which], start_s=self.start_s[which], end_s=self.end_s[which])
 
     @property
     def order(self) -> Longs:
-        """The actions in order, of equal ones the first first."""
+        """Indices that sort the actions by start, end and row; equal actions keep their order."""
         return np.lexsort((self.row, self.end_s, self.start_s))
 
 
@@ -58,7 +58,7 @@ class Plan:
 
     @cached_property
     def columns(self) -> Columns:
-        """The actions as arrays, which a verdict asks for again and again."""
+        """The actions as arrays, kept because the referee reads them again and again."""
         return Columns.of(self.actions)
 
     @classmethod
@@ -72,7 +72,7 @@ class Plan:
         return cls(tuple(map(Action, *(field.tolist() for field in fields))))
 
     def with_kept(self, problem: Problem) -> Plan:
-        """Return the plan with all that must be taken, at its own times."""
+        """Return the plan with every task that must be taken, missing ones at their own times."""
         taken = {action.opportunity for action in self.actions}
         missing = [row for row in problem.kept_rows.tolist() if row not in taken]
         return Plan(tuple(sorted((*self.actions, *Plan.of(problem, missing).actions))))

@@ -1,8 +1,8 @@
-"""Where satellites look at any instant: their paths and the places, as plain arrays.
+"""Lines of sight at any instant, from satellite paths and site positions in plain arrays.
 
-A collect with a start of its own needs its line of sight then, and solvers and the referee
-know no orbits. So a problem with continuous starts carries the polynomials that its accesses
-were computed from; nothing is approximated a second time.
+A collect with a continuous start needs its line of sight at that start, but solvers and the
+referee do not propagate orbits. So a problem with continuous starts carries the polynomials that
+its accesses were computed from; nothing is approximated a second time.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Path(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pointing:
-    """All that lines of sight follow from.
+    """The data from which lines of sight are computed.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def position_m(path: Path, t_s: float) -> Vector:
     """Return the Earth-fixed position: the cubic between the nodes around an instant."""
     k = min(max(int(t_s / path.step_s), 0), len(path.nodes) - 2)
     u = t_s / path.step_s - k
-    # Hermite's four weights.
+    # The four Hermite weights.
     v = 1.0 - u
     a, b = (1.0 + 2.0 * u) * v * v, (1.0 + 2.0 * v) * u * u
     c, d = u * v * v * path.step_s, -v * u * u * path.step_s
@@ -91,7 +91,7 @@ def position_m(path: Path, t_s: float) -> Vector:
 
 @borrowing
 def sight(path: Path, sites: Floats, site: int, t_s: float) -> Vector:
-    """Return the unit vector from the satellite to ``places[place]``, inertial (TEME)."""
+    """Return the unit vector from the satellite to ``sites[site]``, inertial (TEME)."""
     x, y, z = position_m(path, t_s)
     x, y, z = sites[site, 0] - x, sites[site, 1] - y, sites[site, 2] - z
     range_m = math.sqrt(x * x + y * y + z * z)
@@ -109,7 +109,7 @@ def sight(path: Path, sites: Floats, site: int, t_s: float) -> Vector:
 
 @borrowing
 def needed_s(agile: Agile, u: Vector, v: Vector) -> float:
-    """Return the time from the end of a task to the start of another: to turn and to settle."""
+    """Return the time to turn from one line of sight to another, and to settle."""
     angle_deg = angle_between_deg(u, v)
     return slew_s(angle_deg, agile.rate_deg_s, agile.acceleration_deg_s2) + agile.settle_s
 
@@ -127,14 +127,14 @@ def earliest_start_s(
 ) -> float:
     """Return the earliest start between ``open_s`` and ``close_s`` after another task.
 
-    While lines of sight turn more slowly than the satellite, whatever is late enough stays so
-    later on, and this is the earliest one up to a millisecond. Otherwise it is one that
-    suffices. Starts are whole milliseconds; infinite where there is none.
+    While lines of sight turn more slowly than the satellite, every start after a feasible one is
+    feasible too, and this is the earliest to within a millisecond. Otherwise it is a feasible
+    one. Starts are whole milliseconds; infinite if none is found.
 
     Parameters
     ----------
     end_s, looked
-        The end of the task before, and its line of sight then.
+        The end of the previous task, and its line of sight then.
     site
         Row of ``sites`` that the start looks at.
     """
@@ -144,7 +144,7 @@ def earliest_start_s(
     missing = end_s + needed_s(agile, looked, sight(path, sites, site, low)) - low
     if missing <= TIME_TOLERANCE_S / 2.0:
         return low
-    # Secants, each a little too long, until there is time enough; then between the two.
+    # Secant steps, each a little too long, until a start is feasible; then narrow the bracket.
     high, left = low + 1.02 * missing, -1.0
     for _ in range(60):
         high = min(high, close_s)
@@ -191,14 +191,14 @@ def latest_start_s(
 ) -> float:
     """Return the latest start between ``open_s`` and ``close_s`` before another task.
 
-    The mirror of ``earliest_start_s``; minus infinity where there is none.
+    The mirror of ``earliest_start_s``; minus infinity if none is found.
 
     Parameters
     ----------
     start_s, looks
-        The start of the task after, and its line of sight then.
+        The start of the next task, and its line of sight then.
     length_s
-        How long the task to be placed takes.
+        Duration of the task whose start is sought.
     """
     high = math.floor(min(close_s, start_s - agile.settle_s - length_s) * 1000.0 + 1e-4) / 1000.0
     if high < open_s - 1e-9:
@@ -249,7 +249,7 @@ def agile_of(rate_deg_s: float, acceleration_deg_s2: float | None, settle_s: flo
 
 @kernel
 def sights(path: Path, sites: Floats, site: Ints, t_s: Floats) -> Floats:
-    """Return the lines of sight to many places, each at its instant. Shape ``(n, 3)``."""
+    """Return the lines of sight to many sites, each at its own instant. Shape ``(n, 3)``."""
     found = np.empty((len(t_s), 3))
     for i in range(len(t_s)):
         found[i, 0], found[i, 1], found[i, 2] = sight(path, sites, site[i], t_s[i])

@@ -1,8 +1,8 @@
-"""The frozen problem: all that a solver and the referee ever see.
+"""The frozen problem: all that solvers and the referee ever see.
 
-Geometry has been turned into numbers here. Opportunities lie in one table of columns,
-ordered by (start, end, satellite, kind, place); each satellite has a view of its own rows
-which say themselves which of them may follow each other.
+Here geometry has become numbers. Opportunities form one table of columns, ordered by
+(start, end, satellite, kind, id of the site). Each satellite has a view of its own rows, which
+holds the data that decide which of them may follow each other.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from planner_core.worth import best_worths, common_unit, worth_of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Opportunities:
-    """All collects and contacts of a scenario, one row each, in the order of the plan model.
+    """All collects and contacts of a scenario, one row each, in the order given above.
 
     Instants are seconds from the start of the horizon, rounded inward to the millisecond.
-    Angles and distances hold at the middle of the opportunity, in single precision (1e-5 deg,
-    a quarter of a metre): they are for people, plans do not hang on them. Lines of sight are unit
-    vectors from the satellite in the inertial (TEME) frame. Shape ``(n,)`` or ``(n, 3)``.
+    Angles and distances hold at the middle of the opportunity, in single precision (1e-5 deg, a
+    quarter of a metre): apart from image quality they are for display only. Lines of sight are
+    unit vectors from the satellite in the inertial (TEME) frame. Shape ``(n,)`` or ``(n, 3)``.
 
     Attributes
     ----------
@@ -52,12 +52,12 @@ class Opportunities:
     start_s, end_s
         Span of the task itself.
     access_start_s, access_end_s
-        Span of its access, as far as it lies between its target's release and due times.
+        Span of its access, cut to its target's release and due times.
     los_start, los_end
         Line of sight at ``start_s`` and at ``end_s``.
     los_rate_start, los_rate_end
-        How they move there: angular velocity in deg/s, inertial, without the part along the line
-        itself. Zero where the satellite's ``slew_model`` does not ask for it.
+        Their inertial angular velocities in deg/s, without the component along the line itself.
+        Zero unless the satellite's ``slew_model`` asks for them.
     off_nadir_deg, elevation_deg, azimuth_deg, range_m
         At the satellite; at the ground; at the ground from north over east; between both.
     sun_elevation_deg, in_eclipse
@@ -128,13 +128,13 @@ class ImageOnBoard:
     Attributes
     ----------
     target
-        -1 for data of no image, which stands in the queue as well.
+        -1 for data that belongs to no image, which waits in the queue as well.
     amount
-        What is left of it, in recorder capacities; 0 where it is on the ground already.
+        What is left of it, in recorder capacities; 0 if it is on the ground already.
     collected_s
         When its collect ended, before the horizon begins.
     worth
-        Of the image on the ground at once.
+        What the image would earn if it were on the ground at once.
     """
 
     satellite: int
@@ -145,7 +145,7 @@ class ImageOnBoard:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether it is an image, and not on the ground yet."""
+        """Whether it is an image that is not on the ground yet."""
         return self.target >= 0 and self.amount > 0.0
 
 
@@ -156,11 +156,11 @@ class Heading:
     Attributes
     ----------
     free_from_s
-        From when on it may turn, at most 0.
+        When it may begin to turn, at most 0.
     line_of_sight
-        Unit vector, inertial; None for panels at the sun.
+        Unit vector, inertial; None if the panels point at the sun.
     moving_deg_s
-        How that moves, where turns mind.
+        Its angular velocity, if turns depend on it.
     """
 
     free_from_s: float
@@ -170,7 +170,7 @@ class Heading:
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
 class SatelliteProblem:
-    """One satellite's part: its rows of the opportunity table, and what may follow what.
+    """One satellite's part: its rows of the opportunity table, and how it turns between them.
 
     Attributes
     ----------
@@ -179,19 +179,18 @@ class SatelliteProblem:
     sunlight
         Only what ``eclipse_aware`` needs; the whole horizon otherwise.
     event_s
-        Starts of all opportunities of the satellite in the scenario, those that pins or a
-        search leave out included: the events of ``dynamics: paper``. Ascending.
+        Starts of all opportunities of the satellite in the scenario, including those that pins
+        or a search leave out: the events of ``dynamics: paper``. Ascending.
     event
-        For each row its place in ``event_s``. Shape ``(m,)``.
+        Index of each row in ``event_s``. Shape ``(m,)``.
     sun
-        Where the sun stands. None serves where pointing at it is free.
+        Where the sun stands. None is enough if pointing at it is free.
     turns
-        Of each row to the sun and back; no time where pointing at the sun is free.
+        From each row to the sun and back; zero if pointing at the sun is free.
     volume
-        What each contact takes down, in recorder capacities; 0 for collects. Shape ``(m,)``.
+        How much each contact takes down, in recorder capacities; 0 for collects. Shape ``(m,)``.
     heading
-        No task begins before the satellite can have turned to it from there; None where that is
-        not known.
+        No task begins before the satellite can have turned to it from there; None if unknown.
     """
 
     id: str
@@ -217,7 +216,7 @@ class SatelliteProblem:
 
     @property
     def previous_event_s(self) -> Floats:
-        """When the event before each row was; 0 before the first. Shape ``(m,)``."""
+        """Instant of the event before each row; 0 before the first. Shape ``(m,)``."""
         return np.concatenate([[0.0], self.event_s])[self.event]
 
 
@@ -228,15 +227,15 @@ class Problem:
     Attributes
     ----------
     worth
-        What an image by each opportunity earns alone at most, 0 for contacts (see
+        The most that each opportunity's image alone can earn, 0 for contacts (see
         ``planner_core.worth``).
         With continuous starts all collects of an access are worth the same. Shape ``(n,)``.
     full_worth
-        The same for an image that is on the ground at once; None where that is ``worth``.
+        The same for an image that is on the ground at once; None if that is ``worth``.
     objective
-        What of its full worth an image earns when.
+        Which share of its full worth an image earns, and when.
     leaves_none_on_board
-        For searches for plans: whether all their images come down, whatever one on board earns.
+        For searches for plans: whether all images must come down, whatever one on board earns.
     target_access
         Why a target has no opportunity, or ``ACCESS_FOUND``. Shape ``(num_targets,)``.
     station_antennas
@@ -246,11 +245,11 @@ class Problem:
     continuous_starts
         Whether a collect may start anywhere in its access, at a whole millisecond.
     pointing
-        Lines of sight at any instant, where continuous starts need them.
+        For lines of sight at any instant; None without continuous starts.
     pinned
         Opportunities that pins rule out are not in the table; those to be kept are named here.
     origin
-        Row of each opportunity in the scenario's table, where that is another one. Shape ``(n,)``.
+        Row of each opportunity in the scenario's table; None if this is that table. Shape ``(n,)``.
     on_board
         Images that each recorder holds at the start; they come down first, in this order. New
         images of their targets earn nothing.
@@ -278,7 +277,7 @@ class Problem:
 
     @cached_property
     def kept_rows(self) -> Ints:
-        """Return the rows that every plan must take, ascending."""
+        """The rows that every plan must take, ascending."""
         return np.array(sorted(kept.row for kept in self.pinned.kept), dtype=np.int32)
 
     def kept_local(self, satellite: SatelliteProblem) -> Ints:
@@ -293,7 +292,7 @@ class Problem:
 
     @cached_property
     def local_row(self) -> Ints:
-        """Return, for each opportunity, its row in its own satellite's view. Shape ``(n,)``."""
+        """For each opportunity, its row in its own satellite's view. Shape ``(n,)``."""
         local = np.empty(len(self.opportunities), dtype=np.int32)
         for satellite in self.satellites:
             local[satellite.rows] = np.arange(len(satellite), dtype=np.int32)
@@ -301,28 +300,28 @@ class Problem:
 
     @cached_property
     def best_worth(self) -> Floats:
-        """Return the most that an image of each target earns. Shape ``(num_targets,)``."""
+        """The most that an image of each target earns. Shape ``(num_targets,)``."""
         rows, _ = self.target_opportunities
         target = self.opportunities.site[rows]
         return best_worths(target, self.worth[rows], len(self.target_ids))
 
     @cached_property
     def typical_worth(self) -> float:
-        """Return what the best image of a target earns on average; 1 where no target has any."""
+        """What the best image of a target earns on average; 1 if that is 0 or there is none."""
         _, offsets = self.target_opportunities
         offered = self.best_worth[np.diff(offsets) > 0]
         return float(offered.mean()) or 1.0 if len(offered) else 1.0
 
     @cached_property
     def has_better_images(self) -> bool:
-        """Return whether of some target one image earns more than another that earns anything."""
+        """Whether some target has two images of different positive worth."""
         is_worth = (self.opportunities.kind == COLLECT) & (self.worth > 0.0)
         best = self.best_worth[self.opportunities.site[is_worth]]
         return bool(np.any(self.worth[is_worth] < best))
 
     @cached_property
     def reward_unit(self) -> float:
-        """Return an amount of which what any plan earns is a multiple; 0 where there is none."""
+        """An amount such that any plan earns a multiple of it; 0 if none is known."""
         if not self.counts_delivery or self.objective.is_delivered:
             return common_unit(self.worth)
         if self.objective.half_life_s is not None:
@@ -332,18 +331,18 @@ class Problem:
 
     @property
     def counts_delivery(self) -> bool:
-        """Whether what an image earns hangs on when it is on the ground."""
+        """Whether what an image earns depends on when it is on the ground."""
         return self.use_resources and self.objective.counts_delivery
 
     @property
     def worth_on_ground(self) -> Floats:
-        """Return what each image earns alone that is on the ground at once. Shape ``(n,)``."""
+        """What each image alone earns if it is on the ground at once. Shape ``(n,)``."""
         return self.worth if self.full_worth is None else self.full_worth
 
     def worth_of(self, rows: npt.NDArray[np.integer]) -> float:
-        """Return what a plan earns at most that takes these opportunities and breaks nothing.
+        """Return the most that a valid plan of these opportunities earns.
 
-        It earns that where all that it takes is on the ground as early as it can be.
+        It earns that if each of its images is on the ground as early as possible.
         """
         images = rows[self.opportunities.kind[rows] == COLLECT]
         return worth_of(self.opportunities.site[images], self.worth[images])
@@ -362,12 +361,12 @@ class Problem:
 
     @cached_property
     def offers_choice(self) -> bool:
-        """Return whether some access offers several collects."""
+        """Whether some access offers several collects."""
         return len(np.unique(self.opportunities.access)) < len(self.opportunities)
 
     @cached_property
     def target_opportunities(self) -> tuple[Ints, Longs]:
-        """Return collects grouped by target: rows, and offsets of shape ``(num_targets + 1,)``."""
+        """Collects grouped by target: rows, and offsets of shape ``(num_targets + 1,)``."""
         collects = np.flatnonzero(self.opportunities.kind == COLLECT).astype(np.int32)
         order = np.argsort(self.opportunities.site[collects], kind="stable")
         counts = np.bincount(self.opportunities.site[collects], minlength=len(self.target_ids))
@@ -381,9 +380,9 @@ class Problem:
 
 
 def line_of_sight(problem: Problem, row: int, t_s: float) -> Vector:
-    """Return where the satellite looks when it does an opportunity's task at an instant.
+    """Return the line of sight of an opportunity's task at an instant.
 
-    Without ``pointing`` the problem knows that at the opportunity's own start and end only.
+    Without ``pointing`` it is known only at the opportunity's own start and end.
     """
     table, pointing = problem.opportunities, problem.pointing
     if pointing is None:

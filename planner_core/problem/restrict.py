@@ -1,4 +1,4 @@
-"""A problem with some of its opportunities left out, or some that must be taken."""
+"""A problem with some opportunities left out, or with some that must be taken."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from planner_core.problem import (
 def restricted(problem: Problem, rows: npt.NDArray[np.integer]) -> Problem:
     """Return the problem with these opportunities alone, in ascending order.
 
-    Of the tasks to be kept those that are left remain so. Events stay those of the whole.
+    Tasks to be kept remain so if they are among them. Events stay those of the whole problem.
     """
     table = problem.opportunities
     part = Opportunities(**{f.name: getattr(table, f.name)[rows] for f in fields(Opportunities)})
@@ -45,7 +45,7 @@ def restricted(problem: Problem, rows: npt.NDArray[np.integer]) -> Problem:
 
 
 def taking(problem: Problem, contacts: Sequence[int]) -> Problem:
-    """Return the problem with contacts that must be taken."""
+    """Return the problem in which these contacts must be taken."""
     already = {kept.row for kept in problem.pinned.kept}
     new = tuple(Kept(row=row, pointer="") for row in contacts if row not in already)
     return replace(problem, pinned=replace(problem.pinned, kept=(*problem.pinned.kept, *new)))
@@ -64,9 +64,9 @@ def with_table(
     Parameters
     ----------
     origin
-        The row of the problem's table that each stands for.
+        The row of the problem's table that each opportunity stands for.
     events
-        By satellite, ``event_s`` and ``event`` where there are more of them than opportunities.
+        By satellite, ``event_s`` and ``event`` if there are more events than opportunities.
     """
     return replace(
         problem,

@@ -34,17 +34,17 @@ class Retimed(NamedTuple):
 
 
 def retimed(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
-    """Return the problem with these opportunities alone, each at the start beside it.
+    """Return the problem with these opportunities alone, each at its entry of ``start_s``.
 
-    A row may stand several times, at different starts; the same start of the same access is
-    offered once. Angles for people stay those of the source.
+    A row may occur several times, at different starts; the same start in the same access is
+    offered once. Angles for display stay those of the source row.
     """
     table = problem.opportunities
     start_ms = np.rint(start_s * 1000.0).astype(np.int64)
     _, first = np.unique(np.column_stack([table.access[rows], start_ms]), axis=0, return_index=True)
     rows, start_s = rows[first], start_s[first]
     end_s = start_s + (table.end_s[rows] - table.start_s[rows])
-    # Whole milliseconds again, as the table has them.
+    # Round to whole milliseconds again, as in the table.
     end_s = np.where(start_s == table.start_s[rows], table.end_s[rows], np.round(end_s, 3))
     order = np.lexsort(
         (_rank(problem, rows), table.kind[rows], table.satellite[rows], end_s, start_s)
@@ -73,7 +73,7 @@ def retimed(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
 
 
 def with_starts(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
-    """Return the problem with further opportunities: these rows at these starts."""
+    """Return the problem with further opportunities: each of these rows at the given start."""
     every = np.arange(len(problem.opportunities), dtype=np.int32)
     return retimed(
         problem,
@@ -83,7 +83,7 @@ def with_starts(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
 
 
 def offered(made: Retimed, problem: Problem, plan: Plan) -> Plan:
-    """Return a plan of ``problem`` in the rows of what was made from it, action by action.
+    """Return a plan of ``problem`` in the rows of the problem made from it, action by action.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def offered(made: Retimed, problem: Problem, plan: Plan) -> Plan:
 
 
 def _rank(problem: Problem, rows: Ints) -> Ints:
-    """Return the order of the rows' sites by their ids as text, as the table has it."""
+    """Return the rank of each row's site by its id as text, which is the table's order."""
     table = problem.opportunities
     ranks = []
     for ids in (problem.target_ids, problem.station_ids):

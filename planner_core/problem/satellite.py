@@ -1,4 +1,4 @@
-"""One satellite's view of the table of opportunities: its rows, its turns, its times to the sun."""
+"""One satellite's view of the table of opportunities: its rows, slews and turns to the sun."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def build_satellite_problem(
     Parameters
     ----------
     events
-        ``event_s`` and ``event``, where there are more of them than opportunities.
+        ``event_s`` and ``event``, if there are more events than opportunities.
     """
     rows = np.flatnonzero(opportunities.satellite == index).astype(np.int32)
     transitions = _transitions(opportunities, rows, agility)
@@ -78,7 +78,7 @@ def build_satellite_problem(
 
 
 def _transitions(opportunities: Opportunities, rows: Ints, agility: Agility) -> Transitions:
-    """Return how a satellite turns from one of its tasks to the next."""
+    """Return a satellite's tasks and how it turns from one to the next."""
     own = rows if agility.tracks else rows[:0]
     acceleration_deg_s2 = agility.acceleration_deg_s2 if agility.tracks else None
     return Transitions(

@@ -62,7 +62,7 @@ def slew_s(angle_deg: float, rate_deg_s: float, acceleration_deg_s2: float) -> f
 
 @inner
 def reach_deg(room_s: float, rate_deg_s: float, acceleration_deg_s2: float) -> float:
-    """Return the largest angle, up to 180 degrees, that can be turned through in some time.
+    """Return the largest angle, up to 180 degrees, that a satellite turns through in ``room_s``.
 
     >>> reach_deg(32.0, 1.0, 0.5), round(reach_deg(2.828427, 1.0, 0.5), 6)
     (30.0, 1.0)

@@ -1,4 +1,4 @@
-"""Collects that pins, outages or where a satellite looked at the start rule out."""
+"""Collects that are ruled out by pins, by outages or by a satellite's heading at the start."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Struck:
     Attributes
     ----------
     row
-        Of the scenario's table, which the problem no longer has.
+        Row of the scenario's table; the problem no longer has it.
     kept
-        Rows of the problem that it cannot stand beside; none where it is ruled out itself.
+        Kept rows of the problem that exclude it; none if it is ruled out by itself.
     why
-        A pin, an outage that it lies in, or that its satellite cannot turn to it in time from
-        where it looked at the start.
+        A pin, an outage that it lies in, or a heading at the start from which its satellite
+        cannot turn to it in time.
     """
 
     row: int
@@ -43,17 +43,17 @@ class Struck:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StruckCollects(Mapping[int, tuple[Struck, ...]]):
-    """All that are ruled out, by target. Columns: the half of a day that is frozen has many.
+    """All collects that are ruled out, by target; in columns, for a frozen half day has many.
 
     Attributes
     ----------
     target
-        Ascending, as are the rows of each. Shape ``(n,)``, as of all but ``kept``.
+        Ascending, as are the rows of each target. Shape ``(n,)``, as of all but ``kept``.
     why
         ``PIN``, ``OUTAGE`` or ``HEADING``.
     kept, first_kept
-        Rows of the problem that each cannot stand beside: those from its own ``first_kept`` up to
-        the next one's. Shape of the latter ``(n + 1,)``.
+        Kept rows of the problem that exclude collect ``i``:
+        ``kept[first_kept[i] : first_kept[i + 1]]``. Shape of the latter ``(n + 1,)``.
     """
 
     target: Ints
@@ -66,7 +66,7 @@ class StruckCollects(Mapping[int, tuple[Struck, ...]]):
     first_kept: Longs
 
     def __getitem__(self, target: int) -> tuple[Struck, ...]:
-        """Return a target's collects."""
+        """Return a target's ruled-out collects."""
         low, high = self.target.searchsorted([target, target + 1])
         if low == high:
             raise KeyError(target)
@@ -91,12 +91,12 @@ class StruckCollects(Mapping[int, tuple[Struck, ...]]):
         return len(np.unique(self.target))
 
     def placed(self, place: Longs) -> StruckCollects:
-        """Return the same in terms of another problem.
+        """Return the same collects in terms of another problem.
 
         Parameters
         ----------
         place
-            Where each row of this one stands there, -1 where it does not.
+            For each row of this problem its row in the other one; -1 if it has none.
         """
         moved = place[self.kept]
         num_left = np.concatenate([[0], np.cumsum(moved >= 0)])
@@ -108,7 +108,7 @@ class StruckCollects(Mapping[int, tuple[Struck, ...]]):
 
 
 def nothing_struck() -> StruckCollects:
-    """Return that nothing is ruled out."""
+    """Return an empty table: nothing is ruled out."""
     ints, floats = np.empty(0, dtype=np.int32), np.empty(0)
     return StruckCollects(
         target=ints, row=ints, satellite=ints, start_s=floats, end_s=floats,

@@ -1,10 +1,10 @@
 """Turns from the line of sight of a task to the sun, and back.
 
-Panels charge at the sun. Their normal is fixed to the body at ``panel_angle_deg`` from the
-boresight, and the rotation about the boresight is free: the boresight then stands anywhere on a
-cone about the sun, and the least turn to it is the difference of two angles. At 180 deg the cone
-is a line and the turn is exact; at other angles a visit may arrive at one point of the cone and
-leave from another, which is not counted.
+Panels charge when they face the sun. Their normal is fixed to the body at ``panel_angle_deg`` from
+the boresight, and the rotation about the boresight is free: the boresight then lies anywhere on a
+cone about the sun, and the smallest turn to it is the difference of two angles. At 180 deg the
+cone is a line and the turn is exact; at other angles a visit may arrive at one point of the cone
+and leave from another, and the turn between the two is not counted.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class SunPath:
 
 
 class SunTurns(NamedTuple):
-    """Seconds from the end of each task to the sun, and from there to its start; ``(m,)``."""
+    """Seconds to turn from each task's end to the sun, and from there to its start; ``(m,)``."""
 
     out_s: Floats
     back_s: Floats
@@ -56,7 +56,7 @@ def sun_turn_s(
 ) -> float:
     """Return the time to turn between a line of sight and the sun, settling included.
 
-    ``moving_deg_s`` is how the line of sight moves, where ``slew_model`` asks for it.
+    ``moving_deg_s`` is the line of sight's angular velocity; it counts if ``slew_model`` says so.
     """
     lines = np.array([line_of_sight], dtype=np.float64)
     moving = np.array([moving_deg_s], dtype=np.float64)
@@ -66,7 +66,7 @@ def sun_turn_s(
 def angle_to_sun_deg(
     resources: Resources, sun: SunPath | None, line_of_sight: Vector, t_s: float
 ) -> float:
-    """Return the angle that panels turn by between a line of sight and the sun."""
+    """Return the angle by which a satellite turns between a line of sight and the sun."""
     if resources.sun_pointing == "free" or sun is None:
         return 0.0
     hour = np.arange(len(sun.directions)) * sun.step_s
@@ -94,13 +94,13 @@ def sun_turns(
     start_s, end_s
         Of the tasks. Shape ``(m,)``.
     looks, looked
-        Lines of sight then. Shape ``(m, 3)``.
+        Lines of sight at these instants. Shape ``(m, 3)``.
     moves, moved
-        How they move, in deg/s, where ``slew_model`` asks for it. Shape ``(m, 3)``.
+        Their angular velocities, in deg/s; they count if ``slew_model`` says so. Shape ``(m, 3)``.
     """
     return SunTurns(
         out_s=_turns_s(resources, agility, sun, looked, end_s, moved),
-        # Backward in time it is the same turn, with the rate the other way round.
+        # Reversed in time it is the same turn, with the opposite rate.
         back_s=_turns_s(resources, agility, sun, looks, start_s, -moves),
     )
 
@@ -113,7 +113,7 @@ def _turns_s(
     t_s: Floats,
     moving: Floats,
 ) -> Floats:
-    """Return the turns between lines of sight, each at its instant, and the sun.
+    """Return the times of the turns between lines of sight, each at its instant, and the sun.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def _least_turns_s(
     for i in range(len(t_s)):
         k = min(max(int(t_s[i] / step_s), 0), len(directions) - 2)
         u = t_s[i] / step_s - k
-        # Not of length 1 between two directions; the angle does not mind.
+        # Between two directions it is shorter than 1, which does not affect the angle.
         x = (1.0 - u) * directions[k, 0] + u * directions[k + 1, 0]
         y = (1.0 - u) * directions[k, 1] + u * directions[k + 1, 1]
         z = (1.0 - u) * directions[k, 2] + u * directions[k + 1, 2]
@@ -158,7 +158,7 @@ def _least_turns_s(
         if len(moving) == 0:
             turns_s[i] = slew_s(angle_deg, rate_deg_s, acceleration_deg_s2)
             continue
-        # About the same axis as the turn to the sun itself, as far as the panels need.
+        # About the axis of the boresight's turn to the sun, but only as far as the panels need.
         whole = rotation_deg(look, (x, y, z))
         share = (between_deg - panel_angle_deg) / max(between_deg, 1e-9)
         turns_s[i] = moving_turn_s(

@@ -1,8 +1,8 @@
-"""Which task of one satellite may follow which: C(a, b) of eq. 4, asked of geometry.
+"""Which task of one satellite may follow which: C(a, b) of eq. 4, computed from geometry.
 
-A pair costs two loads of a line of sight and one look into a small table of slews. So there is
-no table of pairs, which would grow with the square of how many targets are in view; whoever asks
-for each pair many times makes itself one (``planner_core.precedence.relation``).
+Testing a pair costs two loads of a line of sight and one lookup in a small table of slews. So there
+is no table of pairs, which would grow with the square of the number of targets in view; code that
+tests each pair many times builds one (``planner_core.precedence.relation``).
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ Longs = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]
 
 CLEARLY: Final = 1e-7
-"""In the cosine of an angle: rounding is far smaller."""
+"""A margin in the cosine of an angle: rounding is far smaller."""
 
 _NUM_ROOMS: Final = 4096
-"""Entries of a table of slews: 32 kB stay in the first cache, and one pair in a thousand or so
-lies between two entries and is worked out."""
+"""Entries of a table of slews: 32 kB stay in the first-level cache, and only about one pair in a
+thousand lies between two entries and needs the exact slew time."""
 
 
 class Slews(NamedTuple):
-    """How far a satellite turns in some time.
+    """How far a satellite turns in a given time.
 
     Attributes
     ----------
     longest_s
-        A turn through 180 degrees, without settling.
+        Time of a turn through 180 degrees, without settling.
     per_s
         Entries of ``least_cosine`` for each second.
     least_cosine
         Cosine of the angle that the satellite turns through in 0, 1 / ``per_s``, ... seconds.
         Several satellites' tables may lie in one array.
     first
-        Where this one begins there.
+        Index at which this satellite's table begins in that array.
     """
 
     rate_deg_s: float
@@ -76,13 +76,12 @@ class Transitions(NamedTuple):
     looks, looked
         Lines of sight at start and at end, unit vectors. Shape ``(m, 3)``, C order.
     moves, moved
-        Their angular velocities there, in deg/s. Shape ``(m, 3)``, C order; ``(0, 3)`` where the
-        satellite is taken to turn from rest to rest.
+        Their angular velocities there, in deg/s. Shape ``(m, 3)``, C order; ``(0, 3)`` if the
+        satellite is modelled as turning from rest to rest.
     slews
-        With such velocities, turns that take no longer than the true ones: no time to
-        accelerate.
+        With such velocities, lower bounds on the true turns: accelerating takes no time.
     acceleration_deg_s2
-        The limit of turns between moving lines of sight; ``INSTANT`` where there are none.
+        The limit for turns between moving lines of sight; ``INSTANT`` if there are no such turns.
     """
 
     start_s: Floats
@@ -106,7 +105,7 @@ class Transitions(NamedTuple):
 
 @lru_cache(maxsize=64)
 def slews_of(agility: Agility) -> Slews:
-    """Return how a satellite turns from rest to rest; at once, where it is to turn in motion."""
+    """Return a satellite's slews from rest to rest; with ``INSTANT`` if it turns in motion."""
     acceleration = INSTANT if agility.tracks else agility.acceleration_deg_s2 or INSTANT
     longest_s = float(slew_s(180.0, agility.slew_rate_deg_s, acceleration))
     per_s = (_NUM_ROOMS - 2) / max(longest_s, 1e-3)
@@ -132,9 +131,9 @@ def _least_cosines(rate_deg_s: float, acceleration_deg_s2: float, per_s: float) 
 
 @borrowing_inner
 def turns_within(slews: Slews, room_s: float, looked: Vector, looks: Vector) -> bool:
-    """Return whether the satellite turns from one line of sight to another in some time.
+    """Return whether the satellite can turn from one line of sight to another in ``room_s``.
 
-    Settling is not part of the time; ``TIME_TOLERANCE_S`` is.
+    ``room_s`` excludes settling and includes ``TIME_TOLERANCE_S``.
     """
     if room_s < 0.0:
         return False
@@ -153,10 +152,10 @@ def turns_within(slews: Slews, room_s: float, looked: Vector, looks: Vector) -> 
 
 @borrowing
 def may_follow(transitions: Transitions, a: int, b: int) -> bool:
-    """Return whether local row ``b`` may follow ``a``; ``a`` of -1 is "no task yet"."""
+    """Return whether local row ``b`` may follow ``a``; ``a = -1`` means "no task yet"."""
     if a < 0:
         return True
-    # A task of no length would come before its own end: it never follows itself.
+    # Times alone would let a task of zero length follow itself.
     if b <= a:
         return False
     slews, looks, looked = transitions.slews, transitions.looks, transitions.looked
@@ -183,7 +182,7 @@ def may_follow(transitions: Transitions, a: int, b: int) -> bool:
 
 @kernel
 def may_follow_each(transitions: Transitions, a: Longs, b: Longs) -> Bools:
-    """Return of pairs of local rows whether the second may follow the first. Shape ``(k,)``."""
+    """Return for each pair of local rows whether the second may follow the first; ``(k,)``."""
     found = np.zeros(len(a), dtype=np.bool_)
     for i in range(len(a)):
         found[i] = may_follow(transitions, a[i], b[i])
@@ -191,9 +190,9 @@ def may_follow_each(transitions: Transitions, a: Longs, b: Longs) -> Bools:
 
 
 def near_spans(transitions: Transitions) -> tuple[Ints, Ints]:
-    """Return for each task the first row that begins after it, and from where on all may follow.
+    """Return for each task the first row after its end, and the first from which all may follow.
 
-    Shape ``(m,)`` each; what lies between depends on where the satellite looks.
+    Shape ``(m,)`` each. Which of the rows in between may follow depends on the lines of sight.
     """
     start_s, end_s, slews = transitions.start_s, transitions.end_s, transitions.slews
     near_from = np.searchsorted(start_s, end_s - TIME_TOLERANCE_S)
