@@ -1,1 +1,1 @@
-"""What may follow what among a satellite's tasks, and longest paths over it."""
+"""Precedence among a satellite's tasks, and longest paths over it."""

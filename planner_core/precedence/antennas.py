@@ -1,4 +1,4 @@
-"""Which contacts want the same antennas at the same time."""
+"""Contacts that compete for the same antennas at the same time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
 class AntennaGroup(NamedTuple):
-    """Contacts that a station would have to serve at the same instant, more than it can.
+    """Contacts of a station at the same instant, with more satellites than it has antennas.
 
     Attributes
     ----------
     rows
         Opportunities, ascending.
     limit
-        How many of them a plan may take: the station's antennas.
+        How many of them a plan may take: the number of the station's antennas.
     """
 
     rows: Longs
@@ -32,9 +32,9 @@ _known: Final[WeakKeyDictionary[Problem, tuple[AntennaGroup, ...]]] = WeakKeyDic
 
 
 def antenna_groups(problem: Problem) -> tuple[AntennaGroup, ...]:
-    """Return the largest such groups, by station and in order of time.
+    """Return the maximal groups, by station and in order of time.
 
-    A plan that takes no more of each than its limit has an antenna for every contact.
+    A plan that takes no more contacts of each than its limit has an antenna for every contact.
     """
     groups = _known.get(problem)
     if groups is None:
@@ -53,9 +53,9 @@ def _groups(problem: Problem) -> Iterator[AntennaGroup]:
 
 
 def at_the_same_time(problem: Problem, rows: npt.NDArray[np.integer]) -> list[list[int]]:
-    """Return the largest sets of these opportunities that go on at one instant, in order of time.
+    """Return the maximal sets of these opportunities that overlap at one instant, in time order.
 
-    Rows are ascending in each.
+    Rows are ascending in each set.
     """
     table = problem.opportunities
     rows = rows[np.argsort(table.start_s[rows], kind="stable")]
@@ -65,14 +65,14 @@ def at_the_same_time(problem: Problem, rows: npt.NDArray[np.integer]) -> list[li
         still = rows[:at][table.end_s[rows[:at]] > table.start_s[row] + TIME_TOLERANCE_S]
         now = {row, *still.tolist()}
         if not running <= now:
-            # One of those before has ended: they are all there is of their set.
+            # One of the running ones has ended, so their set could not grow any more.
             found.append(running)
         running = now
     return [sorted(one) for one in [*found, running] if one]
 
 
 def antenna_tolls(problem: Problem, multipliers: Floats | None) -> Floats:
-    """Return what each opportunity pays at these multipliers of antennas. Shape ``(n,)``."""
+    """Return what each opportunity pays for antennas at these multipliers. Shape ``(n,)``."""
     tolls = np.zeros(len(problem.opportunities))
     if multipliers is not None:
         for group, multiplier in zip(antenna_groups(problem), multipliers.tolist(), strict=True):
@@ -81,7 +81,7 @@ def antenna_tolls(problem: Problem, multipliers: Floats | None) -> Floats:
 
 
 def paid_for_antennas(problem: Problem, multipliers: Floats | None) -> float:
-    """Return what all places at these multipliers come to, which no plan pays more than."""
+    """Return the sum of limits times multipliers: the most that any plan pays for antennas."""
     if multipliers is None:
         return 0.0
     limits = np.array([group.limit for group in antenna_groups(problem)], dtype=np.float64)

@@ -1,7 +1,7 @@
-"""Lists of what may follow what, where an oracle walks over each pair many times.
+"""Precedence as lists of arcs, for oracles that visit each pair many times.
 
-Arcs grow with the square of how many targets are in view; paths alone need none of them (see
-``planner_core.precedence.skyline``).
+The number of arcs grows with the square of the number of targets in view; plain longest paths
+need none of them (see ``planner_core.precedence.skyline``).
 """
 
 from __future__ import annotations
@@ -45,15 +45,15 @@ class Arcs(NamedTuple):
 def covering_arcs(precedence: Precedence, later: Ints | None = None) -> Arcs:
     """Return the pairs of tasks that may follow each other with none in between.
 
-    Where "may follow" is transitive, as ``precedence`` must be, a chain of these leads from each
-    task to every task that may follow it. There are about ten for each task, far fewer than
-    pairs; some fifty where an access offers a collect every 15 s.
+    ``precedence`` must be transitive: a chain of these arcs then leads from each task to every
+    task that may follow it. There are about ten for each task, far fewer than pairs; some fifty
+    if an access offers a collect every 15 s.
 
     Parameters
     ----------
     later
-        For each task another one whose followers all may follow it too, or -1 (see
-        ``waiting``): arcs to what follows that one are left out. Shape ``(m,)``.
+        For each task another one whose followers may all follow it too, or -1 (see
+        ``waiting``): arcs to the followers of that one are left out. Shape ``(m,)``.
     """
     m = len(precedence.near_from)
     return _covering(precedence, np.full(m, -1, dtype=np.int32) if later is None else later)
@@ -75,7 +75,7 @@ def _add_followers(
 ) -> None:
     """Mark in ``covered``, whose first bit stands for row ``begin``, the near followers of c.
 
-    Only rows below ``end`` count, which is at most where the far followers begin.
+    Only rows below ``end`` count; ``end`` is at most the first far follower.
     """
     low = near_from[c] - begin
     for k in range(max(low, 0) >> 6, (end - begin + _WORD - 1) >> 6):
@@ -97,7 +97,7 @@ def _covering(precedence: Precedence, later: Ints) -> Arcs:
     count = 0
     for a in range(m):
         begin = near_from[a]
-        # Whatever the longest slew from one of the arcs' ends reaches is covered by it.
+        # An arc covers all rows that even the longest slew from its end reaches.
         end = m
         marked = 0  # words of ``covered`` that are in use
         if later[a] >= 0:
@@ -143,7 +143,7 @@ def _covering(precedence: Precedence, later: Ints) -> Arcs:
 
 @borrowing_inner
 def _trailing_zeros(lowest: np.uint64) -> int:
-    """Return which bit is set, of a word in which one is."""
+    """Return the position of a word's only set bit."""
     at = 0
     for step in (32, 16, 8, 4, 2, 1):
         if lowest >> np.uint64(step + at):
@@ -153,10 +153,10 @@ def _trailing_zeros(lowest: np.uint64) -> int:
 
 @kernel
 def waiting(precedence: Precedence, access: Ints) -> Ints:
-    """Return for each task the next collect of its access, where it may as well be over by then.
+    """Return for each task the next collect of its access if waiting for it loses nothing, or -1.
 
-    That is where whatever may follow the later collect may follow the earlier one too; -1
-    elsewhere. A longest path then reaches what follows the later one by waiting.
+    Waiting loses nothing if whatever may follow the later collect may follow the earlier one too.
+    A longest path then reaches the followers of the later one by waiting.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def waiting(precedence: Precedence, access: Ints) -> Ints:
 
 @kernel
 def near_arcs(precedence: Precedence) -> Arcs:
-    """Return all pairs that the table of near tasks allows."""
+    """Return arcs for all near pairs that may follow each other."""
     m = len(precedence.near_from)
     first = np.zeros(m + 1, dtype=np.int64)
     for a in range(m):
@@ -208,7 +208,7 @@ def near_arcs(precedence: Precedence) -> Arcs:
 
 @kernel
 def reversed_arcs(arcs: Arcs) -> Arcs:
-    """Return the same arcs from their ends to where they come from."""
+    """Return the same arcs, listed from their ends to their origins."""
     m = len(arcs.first) - 1
     first = np.zeros(m + 1, dtype=np.int64)
     for b in arcs.to:
@@ -229,11 +229,11 @@ def reversed_arcs(arcs: Arcs) -> Arcs:
 class ArcNetwork(NamedTuple):
     """The nodes of ``Network`` with stored arcs, for labels that look at each pair many times.
 
-    A path is a sequence of tasks of one satellite that may follow each other directly. Where
-    that relation is transitive only covering arcs are kept (those that no third task can
-    split), for a path may pass through a task without being paid. Where an access offers
-    several collects, what may follow a later one may follow an earlier one too: the path then
-    waits, and arcs from the earlier one to what follows the later one are left out.
+    A path is a sequence of tasks of one satellite that may follow each other directly. It may
+    pass through a task without being paid, so if that relation is transitive only covering arcs
+    are kept (those that no third task can split). If an access offers several collects, what may
+    follow a later one may follow an earlier one too: the path then waits, and arcs from the
+    earlier one to the followers of the later one are left out.
 
     Attributes
     ----------
@@ -242,17 +242,16 @@ class ArcNetwork(NamedTuple):
     site
         Target of each node; of a contact, one past the last target. Shape ``(n,)``.
     first
-        Where each part's nodes begin. A satellite's tasks fall into parts where a pause is
-        longer than any slew: paths before and after it do not mind each other.
-        Shape ``(num_parts + 1,)``.
+        First node of each part. A pause longer than any slew divides a satellite's tasks into
+        parts: paths before and after it are independent. Shape ``(num_parts + 1,)``.
     arc_from, before
         Predecessors of node ``b``: ``before[arc_from[b]:arc_from[b + 1]]``.
     far_from
-        From here on every node of the satellite may follow the node; where its part ends, at
-        most. Shape ``(n,)``.
+        The first node from which all of the satellite may follow the node; at most the end of
+        its part. Shape ``(n,)``.
     earlier
-        The collect before in the same access, from which a path may wait for what follows the
-        node; -1 for none. Shape ``(n,)``.
+        The previous collect in the same access, from which a path may wait for the followers of
+        the node; -1 for none. Shape ``(n,)``.
     """
 
     row: Ints
@@ -304,7 +303,7 @@ def arc_network_of(problem: Problem) -> ArcNetwork:
 
 
 def _within(arcs: Arcs, part: Longs) -> Arcs:
-    """Return the arcs that do not lead from part to part."""
+    """Return the arcs that stay within one part."""
     is_within = np.repeat(part, np.diff(arcs.first)) == part[arcs.to]
     count = np.concatenate([[0], np.cumsum(is_within)])
     return Arcs(count[arcs.first].astype(np.int64), arcs.to[is_within])

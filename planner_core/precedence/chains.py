@@ -1,8 +1,8 @@
-"""Heavy chains of one satellite's tasks, and those in which no target stands twice (``graph``).
+"""Heavy chains of one satellite's tasks, with or without repeated targets (``graph``).
 
-What a chain has passed is handed on along the arcs of the relation's Hasse diagram, and the
-answer depends on them, as does the choice among chains that are as heavy; so they are made here,
-as is the table of all pairs for a satellite that turns more slowly than it tracks.
+The sites on a chain are passed on along the arcs of the relation's Hasse diagram. The result
+depends on these arcs, as does the choice among equally heavy chains, so they are built here; for a
+satellite that turns more slowly than it tracks, the table of all pairs is used instead.
 """
 
 from __future__ import annotations
@@ -16,18 +16,17 @@ from planner_core.problem import Floats, Ints, Longs, SatelliteProblem
 
 
 def heaviest_chain(satellite: SatelliteProblem, weight: Floats) -> list[int]:
-    """Return the tasks of a heaviest chain; a place may stand on it twice."""
+    """Return the tasks of a heaviest chain; a site may occur on it twice."""
     return chain_with_history(satellite, weight, np.full(len(weight), -1, dtype=np.int32))
 
 
 def chain_with_history(satellite: SatelliteProblem, weight: Floats, site: Ints) -> list[int]:
-    """Return the tasks of a heavy chain in which no place stands twice.
+    """Return the tasks of a heavy chain on which no site occurs twice.
 
     Parameters
     ----------
     weight, site
-        Worth of each task, not negative; where it happens, or -1 where it may happen again.
-        Shape ``(m,)``.
+        Worth of each task, not negative; its site, or -1 if it may occur again. Shape ``(m,)``.
     """
     before = np.full(len(weight), -1, dtype=np.int32)
     direct = direct_precedence(satellite)
@@ -50,7 +49,7 @@ def _chain_to(task: int, before: Ints) -> list[int]:
 
 @inner
 def _no_history(weight: Floats, site: Ints) -> Words:
-    """Return an empty set of places for each task."""
+    """Return an empty set of sites for each task."""
     num_words = 0
     for a in range(len(weight)):
         if weight[a] > 0.0:
@@ -75,16 +74,16 @@ def _note(history: Words, task: int, site: int) -> None:
 def longest_path_with_history(
     weight: Floats, site: Ints, arcs: Arcs, before: Ints
 ) -> tuple[float, int]:
-    """Return the weight and end of a heavy chain in which no place stands twice.
+    """Return the weight and last task of a heavy chain on which no site occurs twice.
 
-    Each task hands on the heaviest chain that ends with it or before it, and the set of places
-    on that chain; a chain that holds a task's place already goes past the task. This is a
+    Each task passes on the heaviest chain that ends with it or before it, and the set of sites
+    on that chain; a chain that already holds a task's site bypasses the task. This is a
     heuristic: the best chain to a task need not be part of the best chain through it.
 
     Parameters
     ----------
     weight, site
-        Worth of each task, not negative; where it happens, or -1. Shape ``(m,)``.
+        Worth of each task, not negative; its site, or -1. Shape ``(m,)``.
     before
         Filled with the task before each on its chain, or -1. Shape ``(m,)``.
     """
@@ -92,7 +91,7 @@ def longest_path_with_history(
     history = _no_history(weight, site)
     value = np.zeros(m)
     passed = np.full(m, -1, dtype=np.int32)  # where the heaviest chain comes from
-    fitting = np.full(m, -1, dtype=np.int32)  # and the heaviest without this task's place
+    fitting = np.full(m, -1, dtype=np.int32)  # and the heaviest without this task's site
     last = np.full(m, -1, dtype=np.int32)
     best, best_task = 0.0, -1
     for a in range(m):
@@ -129,15 +128,15 @@ def longest_path_with_history(
 def longest_chain_with_history(
     weight: Floats, site: Ints, precedence: Precedence, by_far: Longs, before: Ints
 ) -> tuple[float, int]:
-    """Return what ``longest_path_with_history`` does, on the table of all pairs.
+    """Return what ``longest_path_with_history`` returns, from the table of all pairs.
 
-    ``by_far`` has the tasks in order of ``far_from``.
+    ``by_far`` lists the tasks in order of ``far_from``.
     """
     near_from, far_from, offset, bits = precedence
     m = len(weight)
     history = _no_history(weight, site)
     reached = np.zeros(m)
-    # Tasks by falling weight of their chains, among those that everything from here may follow.
+    # Tasks that everything from here on may follow, by falling weight of their chains.
     far = np.empty(m, dtype=np.int32)
     num_far, next_far = 0, 0
     best, best_task = 0.0, -1

@@ -1,4 +1,4 @@
-"""Which tasks of a plan leave no room for another."""
+"""Tasks of a plan that conflict with another task."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 
 def conflicts(problem: Problem, row: int, taken: Collection[int] | Ints) -> list[int]:
-    """Return which of these rows cannot stand beside ``row``: no time to turn, or no antenna."""
+    """Return which of these rows conflict with ``row``: no time to turn, or no antenna."""
     table, local = problem.opportunities, problem.local_row
     others = taken if isinstance(taken, np.ndarray) else np.array(list(taken), dtype=np.int64)
     others = others[others != row]

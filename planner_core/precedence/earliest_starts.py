@@ -1,9 +1,9 @@
-"""When one satellite can be at its next task at the earliest, tabulated over cells of starts.
+"""Earliest starts of one satellite's next task, tabulated over cells of starts.
 
 Each task's starts are cut into cells. For each cell the table lists the tasks that may come next,
-in the order in which the satellite can be there after a start at the cell's left edge. While
-lines of sight turn more slowly than the satellite, a later start never leads to an earlier
-arrival: what stands there holds for every start in the cell as a lower bound.
+in order of their earliest start after a start at the cell's left edge. While lines of sight turn
+more slowly than the satellite, a later start never allows the next task to start earlier: each
+entry is a lower bound for every start in the cell.
 """
 
 from __future__ import annotations
@@ -29,28 +29,28 @@ from planner_core.sorting import first_not_below
 Singles = npt.NDArray[np.float32]
 
 EARLY_S: Final = 3e-3
-"""By how much ``earliest_start_s`` may be later than the earliest instant, whole
+"""The most by which ``earliest_start_s`` may exceed the earliest instant, rounding to whole
 milliseconds and tolerance included."""
 
 
 @bundle
 class EarliestStarts(NamedTuple):
-    """Cells, and what may follow from each.
+    """Cells, and the tasks that may follow each.
 
     Attributes
     ----------
     width_s
         Of a cell; a task's last one may be narrower.
     first_cell
-        Where each task's cells begin. Shape ``(n + 1,)``.
+        First cell of each task. Shape ``(n + 1,)``.
     first_arc
-        Where each cell's followers begin. Shape ``(num_cells + 1,)``.
+        First entry of each cell in ``to``. Shape ``(num_cells + 1,)``.
     to
         Tasks that may follow. Shape ``(num_arcs,)``.
     after_s
-        Seconds from the cell's left edge to their earliest start after it.
+        Seconds from the cell's left edge to their earliest start after it, less ``EARLY_S``.
     slope
-        How much later that is per second that the start is later: an estimate.
+        An estimate of how much later they start per second that the start in the cell is later.
     """
 
     width_s: float
@@ -62,7 +62,7 @@ class EarliestStarts(NamedTuple):
 
 
 def num_cells(spans: TimeWindows, width_s: float) -> Ints:
-    """Return into how many cells each task's starts fall. Shape ``(n,)``."""
+    """Return the number of cells of each task. Shape ``(n,)``."""
     count = np.ceil((spans.close_s - spans.open_s) / width_s - 1e-9)
     return np.maximum(count, 1.0).astype(np.int32)
 
@@ -72,7 +72,7 @@ def earliest_starts_of(
 ) -> EarliestStarts:
     """Return the table of one satellite's tasks.
 
-    When ``stop[0]`` becomes non-zero it ends early, and lacks what would come.
+    Once ``stop[0]`` is non-zero it ends early, and the remaining tasks have no followers.
     """
     stop = np.zeros(1, dtype=np.uint8) if stop is None else stop
     first_cell = np.concatenate([[0], np.cumsum(num_cells(spans, width_s))]).astype(np.int32)
@@ -96,7 +96,7 @@ def edge_s(earliest: EarliestStarts, spans: TimeWindows, task: int, cell: int) -
 
 @borrowing
 def follows_at_s(spans: TimeWindows, view: View, a: int, start_s: float, b: int) -> float:
-    """Return the earliest start of ``b`` after ``a`` at ``start_s``; infinite where none is."""
+    """Return the earliest start of ``b`` after ``a`` at ``start_s``; infinite if there is none."""
     end_s = start_s + spans.length_s[a]
     looked = sight(view.path, view.sites_m, spans.site[a], end_s)
     return earliest_start_s(
@@ -124,7 +124,7 @@ def _tabulate(
     to = np.empty(room, dtype=np.int32)
     after_s, slope = np.empty(room, dtype=np.float32), np.empty(room, dtype=np.float32)
     count = 0
-    # Earliest starts after the left edge at hand and after the right one.
+    # Earliest starts after the left and after the right edge of the current cell.
     left, right = np.full(n, np.inf), np.full(n, np.inf)
     own = np.empty(n, dtype=np.int32)
     own_end_s = np.empty(n)
@@ -198,7 +198,7 @@ def _is_covered(
     b: int,
     opens: Floats,
 ) -> bool:
-    """Return whether one of the tasks before can be done on the way, and still ``b`` at once."""
+    """Return whether one of these tasks fits on the way to a start of ``b`` as it opens."""
     u = (opens[b, 0], opens[b, 1], opens[b, 2])
     for i in range(count):
         room_s = spans.open_s[b] - end_s[i]

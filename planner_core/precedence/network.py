@@ -37,9 +37,9 @@ from planner_core.problem.transitions import Slews
 class Network(NamedTuple):
     """The tasks of all satellites, one satellite after another, each in order of start.
 
-    A path is a sequence of tasks of one satellite that may follow each other directly. A
-    satellite's tasks fall into parts where a pause is longer than any slew: paths before and
-    after it do not mind each other.
+    A path is a sequence of tasks of one satellite that may follow each other directly. A pause
+    longer than any slew divides a satellite's tasks into parts: paths before and after it are
+    independent.
 
     Attributes
     ----------
@@ -48,14 +48,14 @@ class Network(NamedTuple):
     site
         Target of each node; of a contact, one past the last target. Shape ``(n,)``.
     first
-        Where each part's nodes begin. Shape ``(num_parts + 1,)``.
+        First node of each part. Shape ``(num_parts + 1,)``.
     start_s, end_s, looks, looked
         As in ``Transitions``. Shape ``(n,)``, ``(n, 3)``.
     by_end
         Each part's nodes in order of end. Shape ``(n,)``.
     is_turning
-        Whether a task brings its satellite further than a slew would, so that a path may gain
-        by it whatever it is worth itself. Shape ``(n,)``.
+        Whether a task turns its satellite further than a slew of its length would, so that a path
+        may gain from it whatever it is worth itself. Shape ``(n,)``.
     satellite
         Of each part, as a row of ``agility``. Shape ``(num_parts,)``.
     agility
@@ -85,7 +85,7 @@ def network_of(problem: Problem, satellites: Sequence[SatelliteProblem] | None =
     tasks = [satellite.transitions for satellite in satellites]
     bases = np.cumsum([0, *(len(satellite) for satellite in satellites)])[:-1]
     ends = [part_ends(transitions) for transitions in tasks]
-    # Of tasks that end together those of no length come last: they may follow the others.
+    # Among tasks that end together those of zero length come last: they may follow the others.
     by_end = [np.lexsort((t.start_s, t.end_s)) for t in tasks]
     rows = _joined([satellite.rows for satellite in satellites], np.int32)
     is_collect = problem.opportunities.kind[rows] == COLLECT
@@ -107,13 +107,13 @@ def network_of(problem: Problem, satellites: Sequence[SatelliteProblem] | None =
 
 
 def _joined(parts: Sequence[npt.ArrayLike], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-    """Return arrays one after another, flat; an empty one for none."""
+    """Return the arrays flattened and joined; an empty one if there are none."""
     flat = [np.ravel(part) for part in parts]
     return np.concatenate([np.empty(0, dtype=dtype), *flat]).astype(dtype)
 
 
 def part_ends(transitions: Transitions) -> Longs:
-    """Return where parts of a satellite's tasks end, each of them followed by all that is after."""
+    """Return the ends of a satellite's parts; every later task may follow every task of a part."""
     slews = transitions.slews
     free_s = np.maximum.accumulate(transitions.end_s) + (slews.longest_s + slews.settle_s)
     ends = np.arange(1, len(free_s) + 1, dtype=np.int64)
@@ -122,7 +122,7 @@ def part_ends(transitions: Transitions) -> Longs:
 
 @borrowing_inner
 def slews_in(network: Network, part: int) -> Slews:
-    """Return how the satellite of a part turns; only for kernels that borrow, as this one does."""
+    """Return the slews of a part's satellite; only for kernels that borrow, as this one does."""
     of = network.satellite[part]
     num_entries = len(network.least_cosine) // len(network.agility)
     rate, acceleration, settle, longest, per_s = (
@@ -144,7 +144,7 @@ def heaviest_paths(
         Worth of each node, not negative. Shape ``(n,)``.
     value, previous
         Filled with the weight of the heaviest path that ends with each node, and with the
-        node ahead of it there, or -1. Nodes of no worth are on no path, but for those by
+        node before it on that path, or -1. Nodes of no worth are on no path, except those by
         which a slow satellite turns. Shape ``(n,)``.
     ends
         Filled with the last node of each part's path, or -1. Shape ``(num_parts,)``.
@@ -162,7 +162,7 @@ def heaviest_path(
 ) -> tuple[float, int]:
     """Return the weight of one part's heaviest path, and its last node or -1.
 
-    The arrays are those of ``heaviest_paths``, of which only the part's own nodes count.
+    The arrays are those of ``heaviest_paths``; only the part's own nodes are used.
     """
     sky = skyline_for(network.first[part + 1] - network.first[part])
     return _scan(network, part, weight, value, previous, sky, False, False)
@@ -175,8 +175,8 @@ def _scan(
 ) -> tuple[float, int]:  # fmt: skip
     """Fill in the heaviest paths that end with each node; backward, those that begin with it.
 
-    Backward time runs from the horizon's end, a task begins with its end and is entered by its
-    start. With ``is_every`` nodes of no worth are asked for too.
+    Backward, time is negated: a task begins at its end and ends at its start. With ``is_every``
+    nodes of no worth are filled in too.
     """
     begin, end = network.first[part], network.first[part + 1]
     slews = slews_in(network, part)
@@ -199,7 +199,7 @@ def _scan(
         limit_s = start_s - slews.settle_s + TIME_TOLERANCE_S
         while entered < end - begin:
             c = end - 1 - entered if is_backward else by_end[begin + entered]
-            # Of tasks of no length at one instant none comes before those with a lower row.
+            # Among tasks of zero length at one instant none comes before one with a lower row.
             is_next = c <= b if is_backward else c >= b
             if is_next or sign * ends_s[c] > limit_s:
                 break
@@ -220,7 +220,7 @@ def _scan(
 
 @kernel
 def heaviest_through(network: Network, weight: Floats) -> tuple[float, Floats]:
-    """Return the sum of the heaviest paths, and the same where each node must be on a path."""
+    """Return the sum of the heaviest paths, and for each node the sum if a path must hold it."""
     n = len(weight)
     through, onward = np.empty(n), np.empty(n)
     previous = np.empty(n, dtype=np.int32)

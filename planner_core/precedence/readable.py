@@ -1,4 +1,4 @@
-"""Longest paths over a skyline in plain Python: what the compiled passes are held against.
+"""Longest paths over a skyline in plain Python: the reference for the compiled passes.
 
 ``skyline`` and ``network`` do the same with labels in arrays, parts, and a table of slews.
 """

@@ -1,13 +1,13 @@
-"""Which tasks of one satellite can stand in one plan at all, directly or with tasks between.
+"""Which tasks of one satellite can be in one plan at all, directly or with tasks in between.
 
-While a satellite turns faster than its lines of sight, "b may follow a" is transitive: what
-cannot follow directly cannot stand in one plan. A slow satellite may still reach b from a
-by way of a task that turns it. The transitive closure covers both: two tasks that it does not
-relate exclude each other, whatever else is planned.
+While a satellite turns faster than its lines of sight, "b may follow a" is transitive: tasks
+that cannot follow directly cannot be in one plan. A slow satellite may still reach b from a
+by way of a task that turns it. The transitive closure covers both cases: two tasks that it does
+not relate exclude each other, whatever else is planned.
 
-The table of pairs grows with the square of how many targets are in view. Longest paths do without
-it (``planner_core.precedence.skyline``); cutting planes, programs and networks with levels look
-at each pair many times and have it made when they first ask.
+The table of pairs grows with the square of the number of targets in view. Longest paths do without
+it (``planner_core.precedence.skyline``); cutting planes, integer programs and networks with levels
+test each pair many times, so the table is built when they first need it.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ _far_from: WeakKeyDictionary[SatelliteProblem, Ints] = WeakKeyDictionary()
 
 
 def direct_precedence(satellite: SatelliteProblem) -> Precedence:
-    """Return which task may follow which directly; made once for a satellite of a problem."""
+    """Return which task may follow which directly; built once per satellite of a problem."""
     table = _tables.get(satellite)
     if table is None:
         near_from, far_from = near_spans(satellite.transitions)
@@ -86,7 +86,7 @@ def transitive_closure(satellite: SatelliteProblem) -> Precedence:
 
 
 def is_transitive_on(satellite: SatelliteProblem) -> bool:
-    """Return whether the satellite gains by way of tasks nothing that it cannot reach directly."""
+    """Return whether the satellite reaches by way of tasks only what it can reach directly."""
     found = _is_transitive.get(satellite)
     if found is None:
         found = _is_transitive[satellite] = _gains_no_way(satellite)
@@ -96,13 +96,13 @@ def is_transitive_on(satellite: SatelliteProblem) -> bool:
 def _gains_no_way(satellite: SatelliteProblem) -> bool:
     turning = turns_slower_than_it_tracks(satellite.transitions)
     if satellite.transitions.is_moving:
-        # The time of a turn in motion is an upper value: any task might make up for that.
+        # The time of a turn in motion is overestimated: a detour by any task might take less.
         turning = np.ones_like(turning)
     return not turning.any() or not _is_shortcut_missing(direct_precedence(satellite), turning)
 
 
 def is_transitive(problem: Problem) -> bool:
-    """Return whether no satellite gains by way of tasks what it cannot reach directly."""
+    """Return whether this holds for every satellite; see ``is_transitive_on``."""
     return all(is_transitive_on(satellite) for satellite in problem.satellites)
 
 
@@ -126,10 +126,10 @@ def _fill_bits(transitions: Transitions, table: Precedence) -> None:
 
 @kernel
 def turns_slower_than_it_tracks(transitions: Transitions) -> Bools:
-    """Return the tasks that bring a satellite further than a slew of their length would.
+    """Return the tasks that turn a satellite further than a slew of their length would.
 
     Slew times grow with the angle, and two slews take no less than one through both angles.
-    So where no task between is one of these, what may follow by way of others may directly.
+    So if no task in between is one of these, what may follow by way of others may also directly.
     """
     looks, looked, slews = transitions.looks, transitions.looked, transitions.slews
     found = np.zeros(len(looks), dtype=np.bool_)
@@ -138,7 +138,7 @@ def turns_slower_than_it_tracks(transitions: Transitions) -> Bools:
             (looks[i, 0], looks[i, 1], looks[i, 2]), (looked[i, 0], looked[i, 1], looked[i, 2])
         )
         needed_s = slew_s(turned_deg, slews.rate_deg_s, slews.acceleration_deg_s2)
-        # Each of the two steps may have used its own rounding. Settling is only ever on top.
+        # Both slews of a detour may have used the tolerance, and a detour settles once more.
         found[i] = (
             needed_s - slews.settle_s + TIME_TOLERANCE_S
             > transitions.end_s[i] - transitions.start_s[i]
@@ -166,14 +166,14 @@ def are_comparable(precedence: Precedence, a: int, b: int) -> bool:
 def excluded_beside(
     satellite: SatelliteProblem, rows: Ints, among: Ints | None = None
 ) -> tuple[Longs, Longs]:
-    """Return which tasks cannot stand in one plan with which of some local rows.
+    """Return pairs of tasks, the first from some local rows, that cannot be in one plan.
 
-    As pairs in order: the position of one in ``rows``, and the local row of the other.
+    They are in order, as the position of the first in ``rows`` and the local row of the other.
 
     Parameters
     ----------
     among
-        The tasks to look at, in order; all without it.
+        The tasks that may be the other, in order; all by default.
     """
     begin, end = near_in_time(satellite, rows)
     if among is not None:
@@ -190,7 +190,7 @@ def excluded_beside(
 
 
 def fit_beside(satellite: SatelliteProblem, one: Longs, other: Longs) -> Bools:
-    """Return whether two local rows can stand in one plan, for each pair. Shape ``(k,)``."""
+    """Return for each pair of local rows whether both can be in one plan. Shape ``(k,)``."""
     earlier, later = np.minimum(one, other), np.maximum(one, other)
     if is_transitive_on(satellite):
         return may_follow_each(satellite.transitions, earlier, later)
@@ -198,12 +198,12 @@ def fit_beside(satellite: SatelliteProblem, one: Longs, other: Longs) -> Bools:
 
 
 def near_in_time(satellite: SatelliteProblem, rows: Ints | Longs) -> tuple[Longs, Longs]:
-    """Return for each of some local rows the span of those that it may exclude: first, last + 1."""
+    """Return for each of these local rows the range that it may exclude: first, last + 1."""
     far_from = _far_from.get(satellite)
     if far_from is None:
         _, far_from = near_spans(satellite.transitions)
         _far_from[satellite] = far_from
-    # What begins before all turns to it must be over, and after all turns from it are, is free.
+    # Tasks outside the range may come before or after the row even by the longest slew.
     begin = np.maximum.accumulate(far_from).searchsorted(rows, side="right")
     return begin, np.maximum(far_from[rows], rows + 1).astype(np.int64)
 
@@ -231,7 +231,7 @@ def _is_shortcut_missing(direct: Precedence, turning: Bools) -> bool:
 
 @kernel
 def _closure_bits(direct: Precedence) -> Bytes:
-    """Work backward: what a task reaches is what its direct followers reach, and they."""
+    """Return the closure's bits, from the last task back: followers, and what they reach."""
     bits = direct.bits.copy()
     closed = Precedence(direct.near_from, direct.far_from, direct.offset, bits)
     for a in range(len(direct.near_from) - 1, -1, -1):

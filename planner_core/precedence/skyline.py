@@ -1,18 +1,18 @@
-"""Labels of paths that end with a task, kept as long as no other one is at least as good.
+"""Labels of paths that end with a task, kept unless another label is at least as good.
 
-A label says what a path is worth, when its last task ends, and where the satellite looks then.
-Labels enter in order of end. One that has ended before, is worth no less, and could have turned
-since to where the new one looks reaches whatever the new one does: a slew through two angles
-takes no less than one through both. Such a new label is left out. Labels hang together from the
-one worth most down, so whoever asks for the best that a task may follow takes the first that it
-may; those that could make a new label needless are the ones that stand before its place.
+A label holds the worth of a path, when its last task ends, and where the satellite looks then.
+Labels enter in order of end. An earlier label dominates a new one if it is worth no less and the
+satellite could have turned since to where the new one looks: it then reaches whatever the new one
+does, for two slews take no less than one through both angles. Dominated labels are left out. The
+others are linked by falling worth, so the best label that a task may follow is the first in the
+list that it may follow, and only labels before its position can dominate a new label.
 
-Nothing is assumed of the tasks in between, so that "may follow" need not be transitive: but
-where a satellite turns more slowly than it tracks, a task of no worth may still be a way to turn.
+Nothing is assumed about the tasks in between, so "may follow" need not be transitive; but if a
+satellite turns more slowly than it tracks, a task of no worth may still be a way to turn.
 
-What else a path carries (a level of energy or data, the targets that it has imaged) belongs
-beside the labels, by their number. A label then stands for another one only where it is at least
-as good in that as well: such a caller asks ``is_as_good`` and its own question, and inserts.
+Whatever else a path carries (a level of energy or data, the targets that it has imaged) is stored
+beside the labels, by their index. A label then dominates another only if it is at least as good in
+that as well: such a caller tests ``is_as_good`` and its own condition, and inserts.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _Z: Final = 4
 
 
 class Skyline(NamedTuple):
-    """Room for labels, in order of end.
+    """Storage for labels, in order of end.
 
     Attributes
     ----------
@@ -45,8 +45,8 @@ class Skyline(NamedTuple):
     node
         The task that a label stands for. Shape ``(n,)``.
     next
-        The label worth most, and after each label the one that is worth as much or else next to
-        it; ``NO_LABEL`` after the last. Shape ``(n + 1,)``.
+        First the label worth most; at ``1 + i`` the label that comes after ``i`` by falling worth;
+        ``NO_LABEL`` after the last. Shape ``(n + 1,)``.
     """
 
     label: Floats
@@ -56,7 +56,7 @@ class Skyline(NamedTuple):
 
 @kernel
 def skyline_for(num_labels: int) -> Skyline:
-    """Return room for so many labels."""
+    """Return storage for this many labels."""
     next_label = np.empty(num_labels + 1, dtype=np.int32)
     next_label[0] = NO_LABEL
     return Skyline(np.empty((num_labels, 5)), np.empty(num_labels, dtype=np.int32), next_label)
@@ -70,7 +70,7 @@ def clear(sky: Skyline) -> None:
 
 @borrowing
 def value_of(sky: Skyline, at: int) -> float:
-    """Return what a label is worth; nothing for ``NO_LABEL``."""
+    """Return what a label is worth; 0 for ``NO_LABEL``."""
     return sky.label[at, _VALUE] if at >= 0 else 0.0
 
 
@@ -82,19 +82,19 @@ def top_label(sky: Skyline) -> int:
 
 @borrowing_inner
 def next_label(sky: Skyline, at: int) -> int:
-    """Return the label that stands after one, worth no more; ``NO_LABEL`` after the last."""
+    """Return the label after ``at``, which is worth no more; ``NO_LABEL`` after the last."""
     return int(sky.next[at + 1])
 
 
 @borrowing_inner
 def is_as_good(sky: Skyline, at: int, end_s: float, looked: Vector, slews: Slews) -> bool:
-    """Return whether whatever follows a new label may follow another one that stands before it."""
+    """Return whether whatever may follow a new label may follow the earlier label ``at``."""
     label = sky.label
     room_s = end_s - label[at, _END]
     if room_s >= slews.longest_s:
         return True
     cosine = label[at, _X] * looked[0] + label[at, _Y] * looked[1] + label[at, _Z] * looked[2]
-    # Clearly, so that no rounding later on makes the other one late.
+    # With a margin, so that no later rounding makes label ``at`` late.
     least = slews.least_cosine[slews.first + int(room_s * slews.per_s)]
     return bool(cosine >= least + CLEARLY)
 
@@ -103,7 +103,7 @@ def is_as_good(sky: Skyline, at: int, end_s: float, looked: Vector, slews: Slews
 def insert(
     sky: Skyline, count: int, before: int, value: float, end_s: float, looked: Vector, node: int
 ) -> None:
-    """Add a label to ``count`` others, none of which ends later, after one worth no less."""
+    """Link a label after ``before``, worth no less, with ``count`` labels that end no later."""
     label = sky.label
     label[count, _VALUE], label[count, _END] = value, end_s
     label[count, _X], label[count, _Y], label[count, _Z] = looked
@@ -115,7 +115,7 @@ def insert(
 def enter(
     sky: Skyline, count: int, value: float, end_s: float, looked: Vector, node: int, slews: Slews
 ) -> int:
-    """Add a label to ``count`` others unless one is as good; return how many there are then.
+    """Add a label to ``count`` others unless one is as good; return the new count.
 
     Labels must come in order of end.
     """
@@ -130,7 +130,7 @@ def enter(
 
 @borrowing_inner
 def reaches(sky: Skyline, at: int, start_s: float, looks: Vector, slews: Slews) -> bool:
-    """Return whether a task that starts then and looks there may follow a label's."""
+    """Return whether a task with this start and line of sight may follow label ``at``."""
     label = sky.label
     room_s = start_s - label[at, _END] - slews.settle_s + TIME_TOLERANCE_S
     return turns_within(slews, room_s, (label[at, _X], label[at, _Y], label[at, _Z]), looks)
@@ -140,7 +140,7 @@ def reaches(sky: Skyline, at: int, start_s: float, looks: Vector, slews: Slews) 
 def best_ahead(sky: Skyline, start_s: float, looks: Vector, slews: Slews) -> int:
     """Return the label worth most that a task may follow; ``NO_LABEL`` if there is none.
 
-    All that end in time must have entered.
+    All labels that end in time must have entered.
     """
     at = top_label(sky)
     while at >= 0 and not reaches(sky, at, start_s, looks, slews):

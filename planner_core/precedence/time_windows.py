@@ -1,6 +1,6 @@
-"""One satellite's tasks when their starts are free: where each may start, and who looks at what.
+"""One satellite's tasks with continuous starts: their time windows and lines of sight.
 
-A task that must be kept, or a contact, has one start alone.
+A task that must be kept, or a contact, has a single start.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ class TimeWindows(NamedTuple):
     row
         An opportunity of the access.
     site
-        Row of ``places_m``: the target, or a station after all targets.
+        Row of ``View.sites_m``: the target, or a station after all targets.
     open_s, close_s
         The first and the last start.
     is_kept
-        Whether the plan must have it.
+        Whether the plan must take it.
     """
 
     row: Ints
@@ -50,12 +50,12 @@ class TimeWindows(NamedTuple):
 
 @bundle
 class View(NamedTuple):
-    """What lines of sight of one satellite follow from.
+    """The data that one satellite's lines of sight and slews are computed from.
 
     Attributes
     ----------
-    places_m
-        Earth-fixed positions of the targets, then of the stations. Shape ``(num_places, 3)``.
+    sites_m
+        Earth-fixed positions of the targets, then of the stations. Shape ``(num_sites, 3)``.
     """
 
     path: Path
@@ -75,7 +75,7 @@ def view_of(problem: Problem, index: int) -> View:
 
 
 def spans_of(problem: Problem, index: int) -> TimeWindows:
-    """Return the collects of one satellite: its accesses, or what pins leave of them."""
+    """Return the windows of one satellite's collects: its accesses, or what pins leave of them."""
     table, pinned = problem.opportunities, problem.pinned
     rows = problem.satellites[index].rows
     rows = rows[table.kind[rows] == COLLECT]
@@ -96,7 +96,7 @@ def spans_of(problem: Problem, index: int) -> TimeWindows:
         after = np.maximum(open_s, np.ceil(blocked.end_s * 1e3 - 1e-4) / 1e3)
         rows, length_s, kept = (np.concatenate([x, x]) for x in (rows, length_s, kept))
         open_s, close_s = np.concatenate([open_s, after]), np.concatenate([before, close_s])
-        # An access after the interval has no part before it, and the other way round.
+        # An access after the blocked span has no part before it, and vice versa.
         is_left = close_s > open_s - _LEAST_S
         rows, length_s, kept = rows[is_left], length_s[is_left], kept[is_left]
         open_s, close_s = open_s[is_left], close_s[is_left]
@@ -125,7 +125,7 @@ def part_of(spans: TimeWindows, rows: npt.NDArray[np.integer] | slice) -> TimeWi
 
 
 def with_contacts(problem: Problem, spans: TimeWindows, rows: Ints) -> TimeWindows:
-    """Return tasks with contacts among them, which have their own start alone."""
+    """Return the tasks together with contacts, each at its own start only."""
     table = problem.opportunities
     joined = TimeWindows(
         row=np.concatenate([spans.row, rows]).astype(np.int32),
@@ -142,7 +142,7 @@ def with_contacts(problem: Problem, spans: TimeWindows, rows: Ints) -> TimeWindo
 
 
 def action_of(problem: Problem, row: int, start_s: float) -> Action:
-    """Return a task at a start of its own, as the opportunity of its access nearest to that."""
+    """Return a task at a start, as the opportunity of its access that is nearest to that start."""
     table = problem.opportunities
     if table.kind[row] != COLLECT:
         return Action(float(table.start_s[row]), float(table.end_s[row]), row)
