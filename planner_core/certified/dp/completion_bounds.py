@@ -1,4 +1,4 @@
-"""How little energy a satellite needs to gain so much: backward, recorder left out."""
+"""The least energy a satellite needs to gain a given worth: backward, recorder left out."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from planner_core.problem import Ints, Singles
 
 @kernel
 def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Singles]:
-    """Return the least energy from which tasks of total weight ``r`` remain possible.
+    """Return the least energy from which tasks of total weight ``r`` or more remain possible.
 
     Parameters
     ----------
     weight
         Whole worth of each task, not negative. Shape ``(m,)``.
     top
-        The largest total asked for.
+        The largest total considered.
 
     Returns
     -------
-    Idle before each row (shape ``(m + 1, top + 1)``), and right after each task (shape
-    ``(m, top + 1)``). Levels as in ``Network``, a little too low rather than too high, and
-    infinite where no energy suffices.
+    Energy while idle before each row (shape ``(m + 1, top + 1)``), and right after each task (shape
+    ``(m, top + 1)``). Energy is as in ``Network``, rounded a little down so that it is a lower
+    bound, and infinite if none suffices.
     """
     m = len(weight)
     idle = np.full((m + 1, top + 1), np.inf, dtype=np.float32)
@@ -58,11 +58,11 @@ def least_energy(network: Network, weight: Ints, top: int) -> tuple[Singles, Sin
 def _lower_by_taking(
     network: Network, row: int, weight: int, give: float, after: Singles, values: Singles
 ) -> None:
-    """Lower each value to what it takes to do the task and still gain as much with it.
+    """Lower each value to the energy needed to gain as much by taking the task.
 
-    ``give`` is what the way to the task gives back.
+    ``give`` is the energy that the arc to the task gives back.
     """
-    # One step of single precision may be off by this much, so that sums stay on the safe side.
+    # One step of single precision may be off by this much; it keeps sums on the safe side.
     rounding = 1.3e-7 * (1.0 + abs(network.energy_floor[-1]))
     cap = np.float32(network.energy_cap[row] + rounding)
     cost = np.float32(network.energy_cost[row] - rounding)

@@ -24,10 +24,10 @@ class Completions(NamedTuple):
     after
         By the energy that is left after it. Shape ``(m, width)``.
     following
-        With that task or a later one next, after idling, by the energy before it. Shape
+        If that task or a later one comes next, after idling, by the energy before it. Shape
         ``(m + 1, width)``.
     in_layer
-        After a contact, in the layer at hand. Shape ``(num_contacts, width)``.
+        After a contact, in the current layer. Shape ``(num_contacts, width)``.
     best
         After a contact, in any layer. Shape ``(num_contacts, width)``.
     """
@@ -40,7 +40,7 @@ class Completions(NamedTuple):
 
 @inner
 def completions_of(num_contacts: int, num_tasks: int, width: int) -> Completions:
-    """Return room for them."""
+    """Return storage for completions."""
     return Completions(
         np.empty((num_tasks, width)),
         np.empty((num_tasks + 1, width)),
@@ -61,7 +61,7 @@ def fill_backward(
 ) -> float:
     """Fill the completions of a layer from its end back to a task.
 
-    Return the most of a path that begins in the layer, where that task is the first of all.
+    Return the most that a path gains that begins in the layer; valid if that task is the first.
     """
     is_last, m, width = layer == len(layers.first) - 1, weight.shape[1], levels.width
     if not is_last:
@@ -96,7 +96,7 @@ def fill_backward(
 
 @inlined
 def _raise_from(values: Floats, others: Floats, up: int) -> None:
-    """Raise values to those of a table that begins ``up`` levels lower; the last holds above."""
+    """Raise values to a table's that begins ``up`` levels lower and whose last one holds above."""
     last = len(others) - 1
     for x in range(len(values)):
         values[x] = max(values[x], others[min(x + up, last)])
@@ -106,7 +106,7 @@ def _raise_from(values: Floats, others: Floats, up: int) -> None:
 def _extend_backward(
     network: Network, levels: EnergyLevels, k: int, weight: float, completions: Completions
 ) -> None:
-    """Extend completions by a task in front: after idling, and by arcs from tasks near it."""
+    """Put a task in front of its completions: after idling, and by arcs from tasks near it."""
     low, cap, cost = levels.lowest[k], levels.cap[k], levels.cost[k]
     least, last = max(levels.floor[k], low), levels.width - 1
     after = completions.after[k]

@@ -1,13 +1,13 @@
-"""The most that one satellite can gain under its battery where images wait for contacts.
+"""The most that one satellite can gain under its battery if images wait for contacts.
 
-What an image is worth hangs on the contact that takes it down, and that is one after it which the
-plan takes. So there is a layer for each contact, in which that one is the next to be taken, and a
-last one in which none is: a path goes on in a layer until its contact, and from there in any later
-one. Contacts that are too many for layers of their own share them, in groups that follow each
-other: a path may take some contacts of a group.
+An image's worth depends on the contact that takes it down, one of those taken after it. So there
+is a layer for each contact, in which that contact is the next to be taken, and a last layer in
+which no contact follows: a path stays in a layer until its contact, and continues from there in any
+later one. If there are too many contacts for a layer each, consecutive contacts share one as a
+group: a path may then take any contacts of the group.
 
-As in ``energy_labels`` worth is exact, energy in levels, rounded in favour of the satellite, and
-recorders are left out.
+As in ``energy_labels`` worth is exact, energy is in levels, rounded in favour of the satellite, and
+the recorder is left out.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ class Layers(NamedTuple):
     Attributes
     ----------
     contact
-        Tasks, ascending. Shape ``(num_contacts,)``.
+        The tasks that are contacts, ascending. Shape ``(num_contacts,)``.
     first
         Group ``g`` has the contacts from ``first[g]`` up to ``first[g + 1]``. Shape
         ``(num_layers,)``.
     group
         Of each task that is a contact; -1 for others. Shape ``(m,)``.
     number
-        Which contact each task is; -1 for others. Shape ``(m,)``.
+        Index of each task in ``contact``; -1 for others. Shape ``(m,)``.
     """
 
     contact: Ints
@@ -67,7 +67,7 @@ def layers_of(network: Network) -> Layers:
 
 
 class Tables(NamedTuple):
-    """The most gained by a path that ends with a task, by energy, as ``most_by_energy`` has it.
+    """The most gained by a path that ends with a task, by energy as in ``most_by_energy``.
 
     Attributes
     ----------
@@ -93,15 +93,15 @@ def most_by_contacts(
     own: Floats,
     num_own: Longs,
 ) -> tuple[float, Ints, Ints]:
-    """Return the most that a path gains, the rows of one that does, and the layer of each.
+    """Return the most that a path gains, the rows of such a path, and the layer of each row.
 
     Parameters
     ----------
     weight
-        Worth of each task in each layer, of contacts in that of their own; ``NEVER`` for tasks
+        Worth of each task in each layer, of contacts in their own layer; ``NEVER`` for tasks
         that no path needs to take. Shape ``(num_layers, m)``.
     own, num_own
-        Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least.
+        Workspace, of shapes ``(m, width)`` and ``(m,)`` at least.
     """
     num_contacts = len(layers.contact)
     tables = Tables(
@@ -126,7 +126,7 @@ def fill_layer(
     layer: int,
     tables: Tables,
 ) -> tuple[float, int]:
-    """Fill the tables of a layer; return the most of any path in it, and its last task."""
+    """Fill the tables of a layer; return the most that any path in it gains, and its last task."""
     own, num_own = tables.own, tables.num_own
     m = weight.shape[1]
     if layer < len(layers.first) - 1:
@@ -141,7 +141,7 @@ def fill_layer(
         merged = merge_ended(network, levels, k, merged, idle, own, num_own)
         number = layers.number[k]
         if number >= 0 and layers.group[k] != layer:
-            # It ends an earlier layer, and begins this one.
+            # The contact has ended an earlier layer, and begins this one.
             num_own[k] = tables.num_at_contact[number]
             for x in range(num_own[k]):
                 own[k, x] = tables.at_contact[number, x]
@@ -167,9 +167,9 @@ def _path_to(
     tables: Tables,
     last: int,
 ) -> tuple[Ints, Ints]:
-    """Return the rows of a path in the last layer that gains its most, and the layer of each.
+    """Return the rows of a best path, which ends in the last layer, and the layer of each row.
 
-    The tables of earlier layers are filled again: all at a time would take too much room.
+    The tables of earlier layers are filled again: keeping all of them would take too much memory.
     """
     own, num_own = tables.own, tables.num_own
     rows = np.empty(weight.shape[1], dtype=np.int32)

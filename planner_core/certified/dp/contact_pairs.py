@@ -1,9 +1,9 @@
-"""The most that a path gains in which one contact directly follows another, for all such pairs.
+"""The most that a path gains if one contact directly follows another, for all such pairs.
 
 ``contact_layers`` is the forward pass: the most of any path up to a task in a layer. Here a
 backward pass adds the completion: the most that may follow a task in a layer, by the energy that is
-left. At the contact where a path enters a layer the two add up. Pairs that cannot beat a known plan
-are left out of the exact programme (``contact_queues``), and so are its states.
+left. At the contact where a path enters a layer the two add up. The exact programme
+(``contact_queues``) leaves out pairs, and states, that cannot beat a known plan.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from planner_core.problem import Floats
 def most_by_pairs(
     network: Network, levels: EnergyLevels, layers: Layers, weight: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the most of a path that goes from one contact, or the start, directly to another.
+    """Return the most that a path gains from one contact, or the start, directly to another.
 
     Each contact must have a layer of its own.
 
     Parameters
     ----------
     weight
-        As of ``most_by_contacts``. Shape ``(num_layers, m)``.
+        As in ``most_by_contacts``. Shape ``(num_layers, m)``.
 
     Returns
     -------
-    A row for the start and for each contact, a column for each next contact and for none; minus
-    infinity where there is no such path, of shape ``(num_contacts + 1, num_layers)``; and the most
+    A row for the start and for each contact, a column for each next contact and for none, minus
+    infinity if there is no such path, of shape ``(num_contacts + 1, num_layers)``; and the most
     that may follow each contact, by the energy that is left, of shape ``(num_contacts, width)``.
     """
     (num_layers, m), width = weight.shape, levels.width

@@ -1,14 +1,14 @@
-"""The most that one satellite gains under battery and recorder where images wait for contacts.
+"""The most that one satellite can gain under battery and recorder if images wait for contacts.
 
-As in ``contact_layers`` there is a layer for each contact, in which that one is the next to be
-taken. Here a path also knows what its recorder holds. That says when each image is down if that
-contact brings it down: once all that was recorded before it is down as well. What the contact has
-no time for comes down in another, and a path with such images promises which one of the next that
-is: their levels of data are listed once for each promise. So nothing is left out but antennas, and
-that a target may be imaged twice; energy and data are in levels, rounded in favour of the
+As in ``contact_layers`` there is a layer for each contact, in which that contact is the next to be
+taken. Here a path also knows what its recorder holds, and so when each image is down if that
+contact takes it down: once all that was recorded before it is down as well. Images that the contact
+has no time for come down in another one, and a path with such images promises which of the next
+contacts that is: their levels of data are listed once for each promise. Only antennas are left out,
+and the rule that a target is imaged once. Energy and data are in levels, rounded in favour of the
 satellite or against it.
 
-Worth is counted in small units, so that a path is found again from its value alone.
+Worth is counted in small units, so that a path can be reconstructed from its value alone.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from planner_core.problem import Bytes, Ints
 
 @kernel
 def most_by_queues(q: Queues, stop: Bytes) -> tuple[float, Ints]:
-    """Return the most that a path gains, and the rows of one that does.
+    """Return the most that a path gains, and the rows of such a path.
 
-    Answers infinity once ``stop`` is set, and no rows where these would take too much room.
+    Returns infinity once ``stop`` is set, and no rows if finding them would take too much memory.
     """
     m, num_levels, width = len(q.number), q.data.num_levels, q.energy.width
     num_contacts = len(q.contact)

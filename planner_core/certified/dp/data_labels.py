@@ -1,7 +1,7 @@
 """The most that one satellite can gain under its recorder alone: worth exact, data in levels.
 
-``most_value`` knows the battery as well, and counts worth in whole units. Without a battery one
-number is left of each level, so that multipliers can be tried by the hundred.
+``most_value`` models the battery as well, and counts worth in whole units. Without a battery each
+level needs only one number, so that hundreds of multipliers can be tried.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ def most_by_data(
     own: Floats,
     source: Ints,
 ) -> tuple[float, Ints]:
-    """Return the most that a path gains, and the rows of one that does.
+    """Return the most that a path gains, and the rows of such a path.
 
     Parameters
     ----------
     weight
         Worth of each task; images that are worth nothing are not taken. Shape ``(m,)``.
     end_cost
-        What a path that ends at each level gains less. Shape ``(num_levels,)``.
+        What a path pays if it ends at each level. Shape ``(num_levels,)``.
     own, source
-        Room to work in, each of shape ``(m, num_levels)`` at least. Filled with the most gained by
-        a path that ends with each row at each level, and with the entry that it comes from.
+        Workspace, each of shape ``(m, num_levels)`` at least. Filled with the most gained by a
+        path that ends with each row at each level, and with the entry that it comes from.
     """
     m, width = len(weight), levels.num_levels
     idle = np.full(width, -np.inf)
-    # The row after which the best path at each level idles.
+    # The last row of the best idle path at each level.
     last = np.full(width, AT_START, dtype=np.int32)
     if levels.start < width:
         idle[levels.start] = 0.0
@@ -72,7 +72,7 @@ def most_by_data(
 def _extend(
     levels: DataLevels, k: int, weight: float, before: Floats, last: Ints, own: Floats, source: Ints
 ) -> None:
-    """Extend paths by row ``k``: the best at each level, and the row that each ends with."""
+    """Extend by row ``k`` the best path ``before`` at each level, which ends with row ``last``."""
     width = source.shape[1]
     for y in range(min(levels.before[k] + 1, levels.num_levels)):
         to = max(levels.floor[k], y + levels.gain[k], 0)

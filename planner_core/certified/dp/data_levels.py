@@ -1,4 +1,4 @@
-"""The recorder in whole levels, rounded so that every plan that fits still fits."""
+"""The recorder in whole levels, rounded so that no plan is lost, or so that every path fits."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from planner_core.problem import Floats, Ints
 class DataLevels(NamedTuple):
     """The data columns of a ``Network`` in levels from 0; shape ``(m,)``.
 
-    ``end`` is the highest at the end, whatever the last image is; ``delivered`` where it must be
-    down. ``least`` is the least data of a plan at each level of optimistic ones (shape
-    ``(num_levels,)``, of capacity).
+    ``end`` is the highest level at the end, whatever the last image is; ``delivered`` is the
+    highest if that image must be down. ``least`` is the least data that a plan may hold at each
+    optimistic level (shape ``(num_levels,)``, in recorder capacities).
     """
 
     num_levels: int
@@ -35,11 +35,11 @@ class DataLevels(NamedTuple):
 
 
 def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> DataLevels:
-    """Return levels of which the smallest collect fills ``per_collect``, where that is not many.
+    """Return levels of which the smallest collect fills ``per_collect``; coarser ones if too many.
 
     Optimistic levels are never above what a plan has on board, so that no plan is lost: what
-    tasks add is rounded down, and so is an empty recorder. Others are never below. (A task may
-    be off by a millionth of a level; limits leave room for that.)
+    tasks add is rounded down, and so is an empty recorder. Others are never below it. (A task
+    may be off by a millionth of a level; limits leave room for that.)
     """
     m = len(network.site)
     is_filling = network.data_gain > 0.0
@@ -49,7 +49,7 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     )
     unit = (highest - lowest) / (MAX_DATA_LEVELS - 4) or 1.0
     if is_filling.any():
-        # Halves of halves: what coarse levels prove, finer ones prove as well.
+        # By powers of two, so that finer levels prove whatever coarser ones prove.
         finest = float(network.data_gain[is_filling].min()) / per_collect
         unit = finest * 2.0 ** np.ceil(np.log2(max(1.0, unit / finest)))
     sign = 1.0 if is_optimistic else -1.0
@@ -68,7 +68,7 @@ def data_levels(network: Network, per_collect: int, *, is_optimistic: bool) -> D
     floor = rounded(network.data_floor, -abs(room)) - base
     delivered = limit(network.delivered)
     if not is_optimistic:
-        # A contact that empties the recorder must do, though its level is rounded up.
+        # A contact that empties the recorder must suffice, although its level is rounded up.
         emptied = np.where(network.is_contact == 1, floor, 0)
         delivered = np.maximum(delivered, np.maximum.accumulate(emptied[::-1])[::-1])
     return DataLevels(

@@ -1,13 +1,13 @@
 r"""A bound on plans that forbids a path to image a target twice in one pass over it.
 
-Where an access offers several collects, the heaviest path of ``network`` takes a target again
-and again while it is in view: the second image is paid as well as the first. Here each path
-remembers the targets that it has imaged and could image again before the next long pause, and
-passes through another collect of such a target unpaid.
+If an access offers several collects, the heaviest path of ``network`` takes a target again
+and again while it is in view: each image is paid like the first. Here each path remembers the
+targets that it has imaged and could image again before the next long pause, and passes through
+another collect of such a target unpaid.
 
 Each node keeps one label for all paths that lead to it: a value :math:`v` that no path exceeds,
-and a set :math:`M` of targets. It stands for a path of value :math:`v_x` that has imaged
-:math:`M_x` because, however both go on, the path gains at most
+and a set :math:`M` of targets. It dominates a path of value :math:`v_x` that has imaged
+:math:`M_x` because, however both continue, the path gains at most
 :math:`\sum_{M \setminus M_x} w` more than the label does: either that is no more than
 :math:`v - v_x`, or :math:`M` is cut down to :math:`M \cap M_x`. So labels only ever forget, and
 values only ever rise: the bound holds for any weights, and never exceeds that of plain paths.
@@ -38,25 +38,25 @@ Words = npt.NDArray[np.uint64]
 
 
 class Memory(NamedTuple):
-    """What paths remember: a bit for each target in view, used again once it is out of view.
+    """What paths remember: a bit for each target in view, reused once it is out of view.
 
     A target is in view from its first collect to its last in one part of the network.
 
     Attributes
     ----------
     group
-        Number of each node's target and part, from 0 on. Shape ``(n,)``.
+        Number of each node's pair of target and part, from 0 on. Shape ``(n,)``.
     bit
-        Of each node's group; -1 where it cannot be imaged twice, or no bit was left.
+        Of each node's group; -1 if its target cannot be imaged twice, or no bit was left.
         Shape ``(n,)``.
     begins
         First node of each node's group. Shape ``(n,)``.
     low, high
-        Bits of the groups that are in view at each node. Shape ``(n,)``.
+        Bits of the groups in view at each node: the first 64, and the others. Shape ``(n,)``.
     start_bit
         Bits in the order in which groups take them.
     num_started
-        How many of those are taken up to each node. Shape ``(n,)``.
+        How many of those are taken up to and at each node. Shape ``(n,)``.
     """
 
     group: Ints
@@ -69,7 +69,7 @@ class Memory(NamedTuple):
 
 
 def memory_of(problem: Problem, network: ArcNetwork) -> Memory:
-    """Return what paths through a network are to remember."""
+    """Return what paths through a network remember."""
     table, rows = problem.opportunities, network.row
     nodes = np.arange(len(rows))
     part = np.searchsorted(network.first, nodes, side="right")
@@ -122,20 +122,20 @@ def _memory(group: Ints, first: Ints, last: Ints, is_twice: Bools) -> Memory:
 
 @bundle
 class Labels(NamedTuple):
-    """The labels of all nodes, and how their values came about; shape ``(n,)``.
+    """The labels of all nodes, and the origins of their values; shape ``(n,)``.
 
     Attributes
     ----------
     value, low, high
         Value, and the bits of the targets that are remembered.
     previous, is_paid
-        Where the value comes from (-1 for the start), and whether the node itself is paid.
+        The node that the value comes from (-1 for the start), and whether the node itself is paid.
     far_value, far_low, far_high, far_node
-        The label of the nodes that all may follow from here on. Shape ``(n + 1,)``.
+        The joint label of nodes that all may follow from here on. Shape ``(n + 1,)``.
     ceiling
         The greatest weight in each group.
     bit_weight
-        The same for the group that holds a bit. Shape ``(128,)``.
+        The same for the group that holds each bit. Shape ``(128,)``.
     """
 
     value: Floats
@@ -152,7 +152,7 @@ class Labels(NamedTuple):
 
 
 def labels_for(network: ArcNetwork, memory: Memory) -> Labels:
-    """Return room for the labels of a network."""
+    """Return storage for the labels of a network."""
     n = len(network.row)
     return Labels(
         value=np.zeros(n),
@@ -173,7 +173,7 @@ def labels_for(network: ArcNetwork, memory: Memory) -> Labels:
 def label_part(
     network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, part: int
 ) -> tuple[float, int]:
-    """Label the nodes of one part; return what its paths are worth at most, and the best's end.
+    """Label the nodes of one part; return a bound on its paths' worth, and the node that has it.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def label_part(
         far_node[b] = NOWHERE
     for b in range(begin, end):
         ceiling[group[b]] = max(ceiling[group[b]], weight[b])
-    # The label of all that is far behind, the start of the part among it.
+    # The joint label of all nodes far behind, including the start of the part.
     far, far_at, f_low, f_high = 0.0, -1, zero, zero
     best_end, best_at = 0.0, -1
     for b in range(begin, end):
@@ -227,7 +227,7 @@ def label_part(
                 reached += w
             if reached > best:
                 best, at, paid, is_far = reached, a, is_new, False
-        # What it remembers, of what others have imaged too.
+        # Of what the best path remembers, keep what the label may claim for the other paths too.
         m_low, m_high = f_low, f_high
         if not is_far:
             new_low, new_high = _begun(start_bit, num_started[at], num_started[b])
@@ -245,7 +245,7 @@ def label_part(
             q = num_started[b]
             i = arc_from[b + 1]
             while i >= arc_from[b] and (m_low | m_high):
-                # What waits comes last.
+                # The arc of waiting comes last.
                 i -= 1
                 is_wait = i < arc_from[b]
                 a = wait if is_wait else before[i]
@@ -269,7 +269,7 @@ def label_part(
                     m_high &= ~left_high
                     whole = _weight_of(m_low, m_high, bit_weight)
         value[b], labels.previous[b], labels.is_paid[b] = best, at, paid
-        # Who may gain more by another collect of the target must not be kept from it.
+        # A path that may gain more by another collect of the target must stay free to take it.
         if w >= ceiling[group[b]]:
             m_low |= own_low
             m_high |= own_high
@@ -288,7 +288,7 @@ def label_part(
 def _pass_on(
     labels: Labels, to: int, value: float, at: int, low: np.uint64, high: np.uint64
 ) -> None:
-    """Let all nodes from one on follow a label."""
+    """Let all nodes from ``to`` on follow a label."""
     if labels.far_node[to] != NOWHERE:
         value, at, low, high = _merged(
             value, at, low, high, labels.far_value[to], labels.far_node[to],
@@ -303,7 +303,7 @@ def _merged(
     value: float, at: int, low: np.uint64, high: np.uint64,
     other: float, other_at: int, other_low: np.uint64, other_high: np.uint64, bit_weight: Floats,
 ) -> tuple[float, int, np.uint64, np.uint64]:  # fmt: skip
-    """Return the better of two labels, the second of equal ones, so that it stands for both."""
+    """Return the better of two labels, the second if equal, cut down so that it covers both."""
     if value <= other:
         value, at, low, high, other, other_low, other_high = (
             other, other_at, other_low, other_high, value, low, high,
@@ -316,7 +316,7 @@ def _merged(
 
 @borrowing_inner
 def _begun(start_bit: Ints, first: int, last: int) -> tuple[np.uint64, np.uint64]:
-    """Return the bits of groups that began one after another."""
+    """Return the bits ``start_bit[first:last]`` of groups that began one after another."""
     low, high = np.uint64(0), np.uint64(0)
     for q in range(first, last):
         started = start_bit[q]
@@ -329,7 +329,7 @@ def _begun(start_bit: Ints, first: int, last: int) -> tuple[np.uint64, np.uint64
 
 @borrowing_inner
 def _weight_of(low: np.uint64, high: np.uint64, bit_weight: Floats) -> float:
-    """Return what a set of targets is worth."""
+    """Return the weight of a set of targets."""
     total = 0.0
     one = np.uint64(1)
     for half in range(2):
@@ -355,7 +355,7 @@ def _weight_of(low: np.uint64, high: np.uint64, bit_weight: Floats) -> float:
 def elementary_paths(
     network: ArcNetwork, memory: Memory, weight: Floats, labels: Labels, counts: Ints
 ) -> float:
-    """Return what the paths of all parts are worth at most.
+    """Return a bound on what the paths of all parts are worth together.
 
     Parameters
     ----------
@@ -377,7 +377,7 @@ def elementary_paths(
 
 
 def elementary_value(problem: Problem, multipliers: Floats) -> tuple[float, Ints]:
-    """Return the bound that multipliers of targets prove, and how often its paths take each target.
+    """Return the bound that target multipliers prove, and how often paths are paid for each target.
 
     This is the whole proof, as ``lagrangian_value`` is that of the plain bound.
     """

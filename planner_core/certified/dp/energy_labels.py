@@ -1,9 +1,9 @@
 """The most that one satellite can gain under its battery alone: worth exact, energy in levels.
 
 ``most_value`` counts worth in whole units and knows energy exactly; here it is the other way
-round, and the recorder is left out. That takes a fraction of the time, so that multipliers can be
-tried by the hundred. For a proof energy is rounded in favour of the satellite, so that no plan is
-lost; a search for multipliers needs only an estimate.
+round, and the recorder is left out. That takes a fraction of the time, so that hundreds of
+multipliers can be tried. For a proof energy is rounded in favour of the satellite, so that no plan
+is lost; a search for multipliers needs only an estimate.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from planner_core.jit import inlined, inner, kernel, templated
 from planner_core.problem import Bools, Floats, Ints, Longs
 
 Rounding = Literal["optimistic", "pessimistic", "nearest"]
-"""No plan is lost, every path keeps its limits, or neither."""
+"""In this order: no plan is lost, every path keeps its limits, neither is guaranteed."""
 
 
 @bundle
@@ -31,11 +31,11 @@ class EnergyLevels(NamedTuple):
     Attributes
     ----------
     lowest
-        The least floor of all rows up to each one.
+        The least of ``floor`` and ``cap - cost`` of all rows up to each one.
     width
         How many levels there are from ``lowest`` up that a path can be at.
     give
-        What the network's arcs to each row give back, as ``straight_rows`` lists them.
+        What the network's arcs to each row give back, in the order of ``straight_rows``.
         Shape ``(num_arcs,)``.
     """
 
@@ -54,15 +54,15 @@ def energy_levels(
     rounding: Rounding = "optimistic",
     exact: Bools | None = None,
 ) -> EnergyLevels:
-    """Return levels of which the cheapest collect costs ``per_collect``, unless they are many.
+    """Return levels of which the cheapest collect costs ``per_collect``; coarser ones if too many.
 
     Parameters
     ----------
     exact
-        Tasks whose own costs are not rounded; only such as every path takes where every path must
-        keep its limits. With each of them levels are counted from a point that lies lower by what
-        its cost is short of whole levels: paths that take it gain nothing by rounding, and others
-        are given that little. Shape ``(m,)``.
+        Tasks whose own costs are not rounded; if every path must keep its limits, only tasks that
+        every path takes. Each one's cost is raised to whole levels, and limits from there on are
+        lowered by as much: paths that take it gain nothing by rounding, and others are given that
+        little. Shape ``(m,)``.
     """
     collects = network.energy_cost[~network.is_contact.astype(np.bool_)]
     positive = collects[collects > 0.0]
@@ -78,7 +78,7 @@ def energy_levels(
         if exact is not None:
             short[exact] = step * _up(network.energy_cost[exact], step) - network.energy_cost[exact]
         lower = np.cumsum(short)
-        # Where every path must keep its limits, what arcs give back is left out.
+        # If every path must keep its limits, what arcs give back is left out.
         cap = up(network.energy_cap - lower + short, step)
         cost = down(network.energy_cost + short, step)
         floor = down(network.energy_floor - lower, step)
@@ -96,20 +96,21 @@ def energy_levels(
 
 
 def levels_of_proof(network: Network, per_collect: int, exact: Bools | None = None) -> EnergyLevels:
-    """Return levels that lose no plan: with turns to the sun as many as tables may have.
+    """Return levels that lose no plan: with turns to the sun, as many as tables may have.
 
-    No two costs are alike there, and what is rounded adds up: on the paper's satellite with a
-    half-life 24 levels to an image proved 203.2, 192 of them 193.6.
+    No two costs are alike with such turns, and roundings add up: on the paper's satellite with a
+    half-life, 24 levels to an image proved 203.2, and 192 of them 193.6.
     """
     levels = MAX_ENERGY_LEVELS if _gives(network) else per_collect
     return energy_levels(network, levels, exact=exact)
 
 
 def levels_of_estimate(network: Network, per_collect: int) -> EnergyLevels:
-    """Return levels at which multipliers are sought; they may lose plans with turns to the sun.
+    """Return levels for the search for multipliers; with turns to the sun they may lose plans.
 
-    Multipliers that fit energy rounded in favour of the satellite fit another satellite: those from
-    half as many levels, rounded to the nearest, prove 0.4 % less in half the time (docs/bounds.md).
+    Rounding in favour of the satellite yields multipliers that suit a stronger satellite. Those
+    from half as many levels, rounded to the nearest, prove bounds that are 0.4 % lower in half the
+    time (docs/bounds.md).
     """
     if _gives(network):
         return energy_levels(network, per_collect // 2, "nearest")
@@ -133,7 +134,7 @@ def _nearest(energy: Floats, step: float) -> Ints:
 
 
 _Round = Callable[[Floats, float], Ints]
-# What counts against the satellite, and what counts for it.
+# How to round what counts against the satellite, and what counts for it.
 _ROUNDED: dict[Rounding, tuple[_Round, _Round]] = {
     "optimistic": (_down, _up),
     "pessimistic": (_up, _down),
@@ -147,7 +148,7 @@ def _rounded_potentials(
     """Return cap, cost and floor by task, and what arcs give back, from potentials in levels.
 
     With turns to the sun no two costs are alike, and rounding each in favour of the satellite
-    would lose up to a level with every task and every arc. Where what idle time adds up to is
+    would lose up to a level with every task and every arc. If the accumulated idle energy is
     rounded instead, the errors along a path cancel.
     """
     before, after = down(network.energy_from, step), up(network.energy_to, step)
@@ -166,16 +167,16 @@ def _rounded_potentials(
 def most_by_energy(
     network: Network, levels: EnergyLevels, weight: Floats, own: Floats, num_own: Longs
 ) -> tuple[float, Ints]:
-    """Return the most that a path gains, and the rows of one that does.
+    """Return the most that a path gains, and the rows of such a path.
 
     Parameters
     ----------
     weight
-        Worth of each task; what is worth nothing is not taken. Shape ``(m,)``.
+        Worth of each task; tasks that are worth nothing are not taken. Shape ``(m,)``.
     own, num_own
-        Room to work in, of shapes ``(m, width)`` and ``(m,)`` at least. Filled with the most
-        gained by a path that ends with each row and leaves at least so much energy, counted from
-        ``lowest``, and with how many such entries there are.
+        Workspace, of shapes ``(m, width)`` and ``(m,)`` at least. Filled with the most gained by a
+        path that ends with each row and leaves at least a certain energy, counted from ``lowest``,
+        and with how many such entries there are.
     """
     m = len(weight)
     idle = np.full(levels.width, -np.inf)
@@ -204,7 +205,7 @@ def merge_ended(
     own: Floats,
     num_own: Longs,
 ) -> int:
-    """Let paths idle whose last task has ended before row ``k``; return how many have by now.
+    """Add to ``idle`` the paths that all rows from ``k`` on may follow; return the rows merged.
 
     ``idle`` begins with the lowest level of row ``k``.
     """
@@ -252,7 +253,7 @@ def extended(
 
 @templated
 def sink(idle: Floats | Ints, levels: int) -> None:
-    """Let the lowest level be so much lower: whoever has more energy has that much as well."""
+    """Lower the lowest level by ``levels``: an entry for more energy holds for less as well."""
     if levels > 0:
         width = len(idle)
         lowest = idle[0]
@@ -264,7 +265,7 @@ def sink(idle: Floats | Ints, levels: int) -> None:
 
 @templated
 def raise_to(values: Floats | Ints, others: Floats | Ints, up: int) -> None:
-    """Raise values to those of a table that begins ``up`` levels higher, or lower."""
+    """Raise values to a table's that begins ``up`` levels higher; lower if it is negative."""
     if len(others) == 0:
         return
     first = others[0]
@@ -280,7 +281,7 @@ def raise_to(values: Floats | Ints, others: Floats | Ints, up: int) -> None:
 def _path_to(
     network: Network, levels: EnergyLevels, weight: Floats, own: Floats, num_own: Longs, last: int
 ) -> Ints:
-    """Return the rows of a path that ends with a row and gains its most, worked out backward."""
+    """Return the rows of a best path that ends with row ``last``, worked out backward."""
     rows = np.empty(len(weight), dtype=np.int32)
     length = 0
     k, energy = last, levels.lowest[last] if last >= 0 else 0
@@ -304,7 +305,7 @@ def _path_to(
 
 @inlined
 def given_between(network: Network, levels: EnergyLevels, i: int, k: int) -> int:
-    """Return the levels that the way from row ``i`` to ``k`` gives back; -1 where there is none."""
+    """Return the levels that the way from row ``i`` to ``k`` gives back; -1 if there is no way."""
     if k >= network.idle_from[i]:
         return 0
     for at in range(network.straight_first[k], network.straight_first[k + 1]):

@@ -1,7 +1,7 @@
 """The most that one satellite can gain under battery and recorder: forward, exact in energy.
 
-At-most-once rows are left out: a target's worth is what its multiplier leaves, and may be gained
-again and again. For each whole value and data level only the most energy matters.
+At-most-once constraints are relaxed: a target's worth is what its multiplier leaves, and may be
+gained again and again. For each whole value and data level only the highest energy matters.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _TIDY_EVERY: Final = TUNING.patience
 
 
 class Labels(NamedTuple):
-    """What was reached right after each task ``i``: entries ``first[i]`` up to ``first[i + 1]``.
+    """The labels right after each task ``i``: entries ``first[i]`` up to ``first[i + 1]``.
 
     Whole value, data level and energy of each entry; shape ``(num_labels,)``.
     """
@@ -41,18 +41,17 @@ class Labels(NamedTuple):
 
 @bundle
 class Goal(NamedTuple):
-    """What a path must gain at least, which tells labels that need no further look.
+    """The least that a path must gain; labels that cannot reach it are dropped.
 
     Attributes
     ----------
     units
         That gain.
     idle, after
-        What ``least_energy`` answered for at least as much: labels that cannot reach the goal
-        are dropped.
+        The result of ``least_energy`` for gains of at least that much.
     credit
-        How much less than the weights count there can be left to gain from each data level,
-        where data is priced there. Shape ``(num_levels,)``.
+        The most by which the gain left from each data level exceeds what ``least_energy`` counts,
+        if its weights price data. Shape ``(num_levels,)``.
     """
 
     units: int
@@ -62,14 +61,14 @@ class Goal(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """The most energy with each data level and whole value, after one task or idle by now.
+    """The highest energy at each data level and whole value, after one task or while idle.
 
     Attributes
     ----------
     energy
-        Values from ``first`` on. Shape ``(num_levels, num_values)``.
+        For values from ``first`` on. Shape ``(num_levels, num_values)``.
     low, high
-        The lowest and the highest value there is at each level. Shape ``(num_levels,)``.
+        The lowest and the highest value reached at each level. Shape ``(num_levels,)``.
     """
 
     energy: Floats
@@ -94,14 +93,14 @@ def most_value(
     Parameters
     ----------
     weight
-        Whole worth of each task, negative where it costs something: a path that has not gained as
-        much by then pays what it has. Shape ``(m,)``.
+        Whole worth of each task; a negative one costs a path no more than it has gained. Shape
+        ``(m,)``.
     end_cost
-        What a path that ends at each data level gains less, not falling. Shape ``(num_levels,)``.
+        What a path pays if it ends at each data level, not falling. Shape ``(num_levels,)``.
     top
         No path gains more.
     keeps_labels
-        Whether to answer the labels as well, for ``path_of``; none otherwise.
+        Whether to return the labels as well, for ``path_of``; none otherwise.
     """
     m, num_levels = len(weight), levels.num_levels
     low = np.full(num_levels, top + 1, dtype=np.int32)
@@ -168,10 +167,8 @@ def most_value(
 
 @inner
 def _none_yet(num_tasks: int) -> list[Floats]:
-    """Return room for the energies after each task.
-
-    A comprehension among named tuples would have Numba make the tuples' arrays twice.
-    """
+    """Return storage for the energies after each task."""
+    # In the caller, among named tuples, Numba would make the tuples' arrays twice.
     return [np.empty((0, 0)) for _ in range(num_tasks)]
 
 
@@ -202,7 +199,7 @@ def _span_of(
 
 @inner
 def _kept(kept: Labels, row: int, own: Reached) -> Labels:
-    """Return the labels with those of one more task behind them."""
+    """Return the labels followed by those of one more task."""
     at = kept.first[row + 1]
     needed = at + own.energy.size
     if needed > len(kept.value):
@@ -219,7 +216,7 @@ def _kept(kept: Labels, row: int, own: Reached) -> Labels:
 
 @inner
 def _longer(labels: Labels, count: int, capacity: int) -> Labels:
-    """Return the first labels with room for more behind them."""
+    """Return the first ``count`` labels in arrays with room for more."""
     value = np.empty(capacity, dtype=np.int32)
     level = np.empty(capacity, dtype=np.int32)
     energy = np.empty(capacity)
@@ -231,7 +228,7 @@ def _longer(labels: Labels, count: int, capacity: int) -> Labels:
 
 @inner
 def _forget(k: int, top: int, idle: Reached, own_low: Ints, own_high: Ints) -> None:
-    """Drop all labels of paths that do not take row ``k``, where that one must be taken."""
+    """Drop all labels of paths that do not take row ``k``, which must be taken."""
     idle.energy[:] = -np.inf
     idle.low[:], idle.high[:] = top + 1, -1
     own_low[:k], own_high[:k] = top + 1, -1
@@ -248,8 +245,7 @@ def path_of(
 ) -> Ints:
     """Return the rows of a path that gains ``value``, in order, worked out backward.
 
-    Any label from which the next one follows to the last bit is as good as the one it was
-    made from.
+    Any label that yields the next one to the last bit is as good as the one it was made from.
     """
     m = len(weight)
     rows = np.empty(m, dtype=np.int32)
@@ -300,7 +296,7 @@ def _leads_to(
     level_after: int,
     energy_after: float,
 ) -> bool:
-    """Return whether task ``k`` (or the end, at m) makes the later label of the earlier one."""
+    """Return whether task ``k`` (or the end, at m) turns the earlier label into the later one."""
     if k == len(network.site):
         return level <= level_after
     if level > levels.before[k]:
@@ -322,7 +318,7 @@ def _take(
     source: Reached,
     own: Reached,
 ) -> None:
-    """Extend all labels of a source by one task; ``give`` is what the way to it gives back."""
+    """Extend all labels of a source by one task; ``give`` is what the arc to it gives back."""
     cap, cost = network.energy_cap[row], network.energy_cost[row]
     floor = network.energy_floor[row]
     most = own.first + own.energy.shape[1] - 1
@@ -333,7 +329,7 @@ def _take(
         if to > levels.after[row] or to >= levels.num_levels:
             continue
         low, high = source.low[y], min(source.high[y], most - gained)
-        # What a path has not gained yet it cannot pay: it is left with nothing.
+        # A path cannot pay more than it has gained: it is left with nothing.
         for v in range(low, min(high + 1, -gained)):
             left = min(source.energy[y, v - source.first] + give, cap) - cost
             if left >= floor:
@@ -354,7 +350,7 @@ def _take(
 
 @inner
 def _merge(source: Reached, idle: Reached) -> None:
-    """Let the labels of a task idle."""
+    """Merge the labels of a task into those that idle."""
     for y in range(len(idle.low)):
         low, high = source.low[y], source.high[y]
         if low > high:
@@ -368,7 +364,7 @@ def _merge(source: Reached, idle: Reached) -> None:
 
 @inner
 def _tidy(labels: Reached, need: Singles, goal: Goal, best_so_far: Floats) -> None:
-    """Drop what cannot reach the goal, and what has less energy than a label with less data."""
+    """Drop labels that cannot reach the goal, or have no more energy than one with less data."""
     low, high = labels.low, labels.high
     lowest, highest = len(best_so_far), -1
     for y in range(len(low)):
@@ -380,7 +376,7 @@ def _tidy(labels: Reached, need: Singles, goal: Goal, best_so_far: Floats) -> No
             continue
         values = labels.energy[y, low[y] - labels.first : high[y] - labels.first + 1]
         best = best_so_far[low[y] : high[y] + 1]
-        # What the first value still wants; more than the table holds is out of reach.
+        # What the lowest value lacks to the goal; more than the table holds is out of reach.
         wanted = goal.units - goal.credit[y] - low[y]
         lost = min(len(values), max(0, wanted + 1 - len(need)))
         short = min(len(values), max(0, wanted))

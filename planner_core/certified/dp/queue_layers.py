@@ -1,7 +1,7 @@
 """The layers of the programme over contacts and queues, filled task by task.
 
-Of a row of energies only those entries are worked on that are told apart; paths that no completion
-lets gain enough are left out as soon as a task has its paths.
+In a row of energies only the entries that ``Tables.span`` tells apart are processed. Paths that no
+completion lets gain enough are dropped as soon as a task has all its paths.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from planner_core.problem import Floats, Ints, Longs
 
 @inner
 def fill(q: Queues, layer: int, source: int, tables: Tables) -> tuple[int, int, int]:
-    """Fill the tables of a layer with paths from one contact, from the start, or from any.
+    """Fill the tables of a layer with paths from one contact, from the start, or from any of them.
 
-    Return the most units of any path in it, its last task and the level of its data.
+    Return the most units that a path in it gains, its last task and its level of data.
     """
     network, energy = q.network, q.energy
     own, low, high = tables.own, tables.low, tables.high
@@ -80,7 +80,7 @@ def fill(q: Queues, layer: int, source: int, tables: Tables) -> tuple[int, int, 
 
 @inner
 def _at_start(q: Queues, layer: int, source: int, begin: int, end: int) -> Idle:
-    """Return what is reached before the first task of a stretch."""
+    """Return the idle paths before the first task of a stretch."""
     energy, top, num_listed = q.energy, top_of(q, layer), num_listed_of(q, layer)
     base = energy.lowest[end - 1] if end > begin else 0
     width = energy.width + (energy.lowest[begin] - base if end > begin else 0)
@@ -103,7 +103,7 @@ def _at_start(q: Queues, layer: int, source: int, begin: int, end: int) -> Idle:
 
 @inner
 def _rest(q: Queues, tables: Tables, i: int, idle: Idle) -> None:
-    """Let paths idle whose last task has ended."""
+    """Add the paths that end with a task to those that idle."""
     slot, up = i % len(tables.own), q.energy.lowest[i] - idle.base
     own, span = tables.own[slot], tables.span[slot]
     for y in range(tables.low[i], tables.high[i] + 1):
@@ -114,7 +114,7 @@ def _rest(q: Queues, tables: Tables, i: int, idle: Idle) -> None:
 
 @borrowing_inner
 def _raise_idle(units: Ints, span: Longs, own: Ints, own_span: Longs, y: int, up: int) -> None:
-    """Raise what is idle at a level to what a task has, which is counted from ``up`` higher."""
+    """Raise idle entries at a listed level to a task's, whose energy is counted from ``up``."""
     skipped, end = max(own_span[y, 0], 0), own_span[y, 1] + up
     begin, least = max(skipped + up, 0), own[y, skipped]
     if span[y, 1] <= span[y, 0]:
@@ -127,7 +127,7 @@ def _raise_idle(units: Ints, span: Longs, own: Ints, own_span: Longs, y: int, up
     for x in range(min(end, last) - begin):
         units[y, begin + x] = max(units[y, begin + x], own[y, skipped + x])
     span[y, 0], span[y, 1] = min(first, begin), max(last, end)
-    # Who has more energy has less as well.
+    # An entry for more energy holds for less as well.
     for x in range(min(begin, last) - 1, first - 1, -1):
         if units[y, x] >= least:
             break
@@ -145,7 +145,7 @@ def _take(
     idle: Idle,
     tables: Tables,
 ) -> None:
-    """Extend all paths by a task, of those that do not leave out the task that they must take."""
+    """Extend all paths by a task, except those that leave out ``kept``, which they must take."""
     network, energy, data = q.network, q.energy, q.data
     top, is_end, is_fixing = top_of(q, layer), q.number[k] >= 0, len(q.fixing.weight) > 0
     least = max(0, energy.floor[k] - energy.lowest[k])
@@ -204,13 +204,13 @@ def _raise(
     most: int,
     up: int,
 ) -> None:
-    """Extend paths at one level by a task, to another level."""
+    """Extend the paths at one listed level by a task, to another listed level."""
     if own_span[to, 1] == 0:
         for x in range(own.shape[1]):
             own[to, x] = UNREACHED_UNITS
         own_span[to, 0] = most
     begin, last = max(span[listed, 0], 0), min(span[listed, 1] + up, most)
-    # More energy than there is room for is as much as there is room for.
+    # Energy above the most that the table has room for counts as that.
     first = max(min(max(begin + up, least), most - 1), 0)
     skipped = max(first - up, begin)
     own[to, first] = max(own[to, first], before[listed, skipped])
@@ -222,7 +222,7 @@ def _raise(
 
 @inner
 def _settle(q: Queues, k: int, earned: Ints, needed: Floats, tables: Tables) -> None:
-    """Add what a task earns; leave out paths that no completion lets gain enough."""
+    """Add what a task earns; drop paths that no completion lets gain enough."""
     slot, is_fixing = k % len(tables.own), len(q.fixing.weight) > 0
     own, span, further = tables.own[slot], tables.span[slot], tables.further
     first, last = tables.high[k] + 1, -1
@@ -241,12 +241,14 @@ def _settle(q: Queues, k: int, earned: Ints, needed: Floats, tables: Tables) -> 
 
 @borrowing_inner
 def _close(own: Ints, span: Longs, at: int, earned: int, further: Ints, least: int) -> bool:
-    """Do so at one level, and say whether any path is left: who has more energy has less as well.
+    """Do so at one listed level; return whether any path is left.
+
+    Entries for more energy come to hold for less as well.
 
     Parameters
     ----------
     further, least
-        Units of completions, and what a path must gain more than.
+        Units of completions, and the units that a path must exceed.
     """
     begin, end = max(span[at, 0], 0), span[at, 1]
     for j in range(end - begin):
@@ -268,7 +270,7 @@ def _close(own: Ints, span: Longs, at: int, earned: int, further: Ints, least: i
 
 @inner
 def _begin_with(q: Queues, tables: Tables, k: int, number: int, layer: int) -> None:
-    """Go on in a layer from the contact that ended an earlier one."""
+    """Continue in a layer from the contact that ended an earlier one."""
     slot, states = k % len(tables.own), tables.at_contact[number]
     table, width = tables.own[slot], q.energy.width
     tables.low[k], tables.high[k] = 0, q.data.num_levels - 1

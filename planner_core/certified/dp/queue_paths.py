@@ -1,4 +1,4 @@
-"""Paths of the programme over contacts and queues, found again from what they gain."""
+"""Paths of the programme over contacts and queues, reconstructed from what they gain."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from planner_core.problem import Ints
 
 @inner
 def path_to(q: Queues, tables: Tables, units: int, last: int, level: int) -> Ints:
-    """Return the rows of a path in the last layer, worked out backward.
+    """Return the rows of a path that ends in the last layer, worked out backward.
 
     The tables of a stretch between two contacts are filled again, from each contact that it may
-    begin with, until the path is among them.
+    begin with, until they hold the path.
     """
     rows = np.empty(len(q.number), dtype=np.int32)
     length, layer = 0, len(q.contact)
@@ -58,7 +58,7 @@ def path_to(q: Queues, tables: Tables, units: int, last: int, level: int) -> Int
 
 @inner
 def _kept_of(q: Queues, layer: int, source: int, tables: Tables) -> Tables:
-    """Fill the tables of a stretch again and keep them; too many, and unfilled, are a refusal."""
+    """Fill the tables of a stretch again and keep them; leave them unfilled if too large."""
     begin, end = stretch_of(q, layer, source)
     num_kept = 0
     for k in range(begin, end):
@@ -82,7 +82,7 @@ def _kept_of(q: Queues, layer: int, source: int, tables: Tables) -> Tables:
 
 @inner
 def _look_back(q: Queues, tables: Tables, layer: int, source: int, at: Ints) -> None:
-    """Say where a contact that a layer began with is listed in its own."""
+    """Set ``at`` to where the contact that began a layer is listed in its own layer."""
     level, _ = level_of(q, top_of(q, layer), at[1])
     x = max(0, at[2] - q.energy.lowest[at[0]])
     is_free = tables.at_contact[source, 0, level, x] == at[3]
@@ -91,7 +91,7 @@ def _look_back(q: Queues, tables: Tables, layer: int, source: int, at: Ints) -> 
 
 @inlined
 def _value_at(q: Queues, tables: Tables, k: int, listed: int, energy: int) -> int:
-    """Return the most units of a path that ends with a task and leaves that and so much energy."""
+    """Return the most units of a path that ends with task ``k`` at a listed level and an energy."""
     x = max(0, energy - q.energy.lowest[k])
     if listed < tables.low[k] or listed > tables.high[k] or x >= q.energy.width:
         return UNREACHED_UNITS
@@ -102,12 +102,12 @@ def _value_at(q: Queues, tables: Tables, k: int, listed: int, energy: int) -> in
 def _trace(
     q: Queues, layer: int, source: int, tables: Tables, at: Ints, rows: Ints, length: int
 ) -> int:
-    """Go back to the contact that a stretch begins with, or to the start; return how many rows.
+    """Go back to the contact that a stretch begins with, or to the start; return the new length.
 
     Parameters
     ----------
     at
-        Task, where its level is listed, energy and units of the path so far, changed in place.
+        Task, listed level, energy and units of the path up to here, changed in place.
     rows, length
         Where to write the rows, the last first, and how many there are.
     """
@@ -116,7 +116,7 @@ def _trace(
     earned, needed = np.empty(num_listed, dtype=np.int32), np.empty(num_listed)
     while at[0] >= 0:
         k, listed = at[0], at[1]
-        # What was left out at this energy has the units of paths with more.
+        # Entries repeat the units of paths with more energy: go to the highest with these units.
         while _value_at(q, tables, k, listed, at[2] + 1) == at[3]:
             at[2] += 1
         if source >= 0 and k == begin:

@@ -1,4 +1,4 @@
-"""Tables of the programme over contacts and queues: what they hold, and where each level stands."""
+"""Tables of the programme over contacts and queues, and the index of each level in them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from planner_core.problem import Floats, Ints, Longs
 
 @bundle
 class Fixing(NamedTuple):
-    """What paths that earn too little are told by: a relaxation in which tables are small.
+    """A relaxation with small tables, by which paths that earn too little are recognized.
 
     Attributes
     ----------
     layers, weight
         Those of ``contact_layers``, each contact with a layer of its own, and what tasks are worth
-        in them. The latter of shape ``(num_contacts + 1, m)``, ``(0, 0)`` where nothing is fixed.
+        in them. The latter has shape ``(num_contacts + 1, m)``; ``(0, 0)`` if nothing is fixed.
     toll
         The multiplier of each contact, by volume. Shape ``(num_contacts,)``.
     after_contact
-        The most that may follow each contact, by energy. Shape ``(num_contacts, width)``.
+        The most that may be gained after each contact, by energy. Shape ``(num_contacts, width)``.
     least
-        What a path must gain more than.
+        A path must gain more than this.
     """
 
     layers: Layers
@@ -45,34 +45,34 @@ class Queues(NamedTuple):
     Attributes
     ----------
     contact
-        Tasks, ascending. Shape ``(num_contacts,)``.
+        The tasks that are contacts, ascending. Shape ``(num_contacts,)``.
     number
-        Which contact each task is; -1 for others.
+        Index of each task in ``contact``; -1 for others.
     first
-        Of each layer, the earliest contact that a path may go on from in it; -1 for the start.
-        Shape ``(num_contacts + 1,)``.
+        For each layer, the earliest contact from which a path may continue in it; -1 for the
+        start. Shape ``(num_contacts + 1,)``.
     down_s
-        When each contact has taken down so many steps of what was recorded; infinite for what it
-        has no time for. Shape ``(num_contacts, num_steps)``.
+        When each contact has taken down 0, 1, 2, ... steps of what was recorded; infinite for what
+        it has no time for. Shape ``(num_contacts, num_steps)``.
     step
-        In recorder capacities.
+        Of ``down_s``, in recorder capacities.
     ready_s
-        When each contact begins to take down. Shape ``(num_contacts,)``.
+        When each contact begins to take data down. Shape ``(num_contacts,)``.
     volume
-        What each contact takes down, in recorder capacities. Shape ``(num_contacts,)``.
+        How much each contact takes down, in recorder capacities. Shape ``(num_contacts,)``.
     num_classes
         Of promises: the next contact after a layer's own, the one after that, ..., any later one.
     queued
-        What was recorded when an image has ended, less what is so at a level of 0.
+        What is on board when each task has ended, less the data that its level stands for.
     end_s, on_board, decaying, most
-        When each task ends, and what it earns on board, by how much more if it is down at
-        once, and at most.
+        When each task ends, what it earns on board, how much more if it is down at once, and the
+        most that it earns.
     multiplier
-        What each costs.
+        Of each image's target; 0 for contacts.
     unit
-        Of worth.
+        In which worth is counted.
     num_tables
-        Before so many further tasks all may follow a task for nothing.
+        How many tasks' tables are kept at a time: all later tasks may follow a task by idling.
     takes_worthless
         Whether a path may need tasks that are worth nothing.
     """
@@ -104,32 +104,32 @@ class Queues(NamedTuple):
 class Tables(NamedTuple):
     """The most units of a path that ends with a task, at each level of data and energy.
 
-    A layer has levels of data up to what its contact takes down, and then all higher ones for each
-    class of promises; ``level_of`` tells them. An entry stands for at least so much energy,
-    counted from the task's ``lowest``; what is below 0 is not reached.
+    A layer lists the levels of data that its contact takes down as a whole, and then all higher
+    ones for each class of promises (see ``level_of``). An entry stands for at least a certain
+    energy, counted from the task's ``lowest``; entries below 0 are not reached.
 
     Attributes
     ----------
     own
-        Of tasks, each until all may follow it for nothing. Shape
+        Of tasks, each until all may follow it by idling. Shape
         ``(num_tables, most_listed, width)``.
     span
-        Which entries of a row are told apart, from the first up to the second: all before have the
-        units of the first of them, all from the second on are not reached; 0 in a row without any.
-        Shape ``(num_tables, most_listed, 2)``.
+        Which entries of a row are told apart, from the first up to the second number: all before
+        have the units of the first of them, all from the second on are not reached. The second is 0
+        in a row without entries. Shape ``(num_tables, most_listed, 2)``.
     low, high
-        The listed levels reached, by task. Shape ``(m,)``.
+        The first and the last listed level reached, by task. Shape ``(m,)``.
     at_contact
         Of contacts, when they end their layers, by what was promised, 0 for nothing. Shape
         ``(num_contacts, num_classes + 1, num_levels, width)``.
     completions
-        Of the layer at hand, by the relaxation.
+        Of the current layer, by the relaxation.
     further
-        Units of the completions of a task, rounded up; 0 where paths are not left out. Shape
+        Units of the completions of a task, rounded up; 0 if no paths are left out. Shape
         ``(width,)``.
     kept, kept_at
-        What is kept of a stretch to go back in it: listed levels from ``low`` up to ``high``, and
-        where those of each task begin. Shapes ``(num_kept, width)`` and ``(m,)``.
+        Tables of a stretch, kept to trace a path back: listed levels from ``low`` up to ``high``,
+        and where those of each task begin. Shapes ``(num_kept, width)`` and ``(m,)``.
     """
 
     own: Ints
@@ -144,7 +144,7 @@ class Tables(NamedTuple):
 
 
 class Idle(NamedTuple):
-    """The most units of a path whose last task has ended, as ``Tables`` have those of a task.
+    """The most units of an idle path, in the form in which ``Tables`` hold those of a task.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def num_listed_of(q: Queues, layer: int) -> int:
 
 @inlined
 def level_of(q: Queues, top: int, listed: int) -> tuple[int, int]:
-    """Return the level of data that is listed there, and the class of promises; 0 for none."""
+    """Return the level of data at a listed index, and the class of promises; 0 for none."""
     if listed < top:
         return listed, 0
     promised = 1
@@ -191,7 +191,7 @@ def level_of(q: Queues, top: int, listed: int) -> tuple[int, int]:
 
 @inlined
 def index_of(q: Queues, top: int, level: int, promised: int) -> int:
-    """Return where a level of data is listed with a promise."""
+    """Return the index at which a level of data is listed with a promise."""
     if level < top:
         return level
     return int(level + (promised - 1) * (q.data.num_levels - top))
@@ -205,7 +205,7 @@ def level_after(data: DataLevels, k: int, level: int) -> int:
 
 @inner
 def stretch_of(q: Queues, layer: int, source: int) -> tuple[int, int]:
-    """Return the tasks of a layer that paths from a contact, or from any, may take."""
+    """Return the range of tasks of a layer that paths from a contact, or from any, may take."""
     end = q.contact[layer] + 1 if layer < len(q.contact) else len(q.number)
     begin = q.contact[q.first[layer]] if q.first[layer] >= 0 else 0
     return (q.contact[source] if source >= 0 else begin), end

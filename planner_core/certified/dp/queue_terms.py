@@ -1,4 +1,4 @@
-"""What the programme over contacts and queues knows of one satellite."""
+"""The data of the programme over contacts and queues for one satellite."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def queues_of(
     keeps_battery: bool = False,
     keeps_recorder: bool = False,
 ) -> Queues | None:
-    """Return the programme of a satellite; None where it would take too long.
+    """Return the programme of a satellite; None if it would take too long.
 
     Parameters
     ----------
     network
-        Its network, relaxed or strict as the programme is.
+        Its network, relaxed or strict as the programme is to be.
     multiplier
         Of each target. Shape ``(num_targets,)``.
     per_collect
@@ -50,18 +50,18 @@ def queues_of(
     num_classes
         Of promises.
     data_per_collect
-        How many levels of data the smallest image takes; as many as tuning says by default.
+        How many levels of data the smallest image takes; ``TUNING.coarse`` by default.
     rows
-        Those of its tasks that count, ascending; all by default.
+        The tasks to include, ascending; all by default.
     earliest, fixing
-        Direct predecessors of contacts, and what leaves paths out (``contact_reductions``); any and
-        nothing by default. Shape ``(num_contacts + 1,)``.
+        Earliest direct predecessors of contacts, and what leaves paths out
+        (``contact_reductions``); any and nothing by default. Shape ``(num_contacts + 1,)``.
     exact
-        Tasks whose energy is not rounded, as ``energy_levels`` takes them; by default those that
-        must be taken. Shape ``(m,)``, of those that count.
+        Tasks whose energy is not rounded, as in ``energy_levels``; by default those that must be
+        taken. Shape ``(m,)``, of the tasks included.
     keeps_battery, keeps_recorder
-        Whether energy, or data, is rounded so that all paths keep their limits, and not so that no
-        plan is lost.
+        Whether energy, or data, is rounded so that all paths keep their limits, rather than so that
+        no plan is lost.
     """
     network = network if rows is None else part_of(network, rows)
     rows = np.arange(len(satellite), dtype=np.int32) if rows is None else rows
@@ -110,20 +110,20 @@ def queues_of(
 
 
 def _num_tables(network: Network) -> int:
-    """Return of how many tasks the paths are worked on at a time."""
+    """Return for how many tasks tables are needed at a time."""
     num_rows = len(network.idle_from)
     ahead = (network.idle_from - np.arange(num_rows)).max(initial=0)
     return max(1, min(num_rows, int(ahead) + 1))
 
 
 def _step_of(data: DataLevels, volume: Floats) -> float:
-    """Return the amount of data in which the times at which contacts take it down are listed."""
+    """Return the step of data by which the times in ``Queues.down_s`` are listed."""
     level = float(data.least[1] - data.least[0]) if data.num_levels > 1 else 1.0
     return max(level / QUEUE_STEPS, float(volume.max(initial=0.0)) / MAX_QUEUE_STEPS)
 
 
 def _ready_s(problem: Problem, satellite: SatelliteProblem, contacts: Ints) -> Floats:
-    """Return from when on contacts take down data. Shape ``(num_contacts,)``."""
+    """Return when contacts begin to take data down. Shape ``(num_contacts,)``."""
     setup_s = problem.downlinks.stations.setup_s[satellite.site[contacts]]
     ready_s: Floats = satellite.start_s[contacts] + setup_s
     return ready_s
@@ -141,14 +141,14 @@ def _nothing_fixed(network: Network) -> Fixing:
 
 
 def _must_follow(network: Network, contact: Ints) -> Ints:
-    """Return for each layer the contact that a path must take before its own; -1 for none."""
+    """Return for each layer the last contact before its own that paths must take; -1 for none."""
     kept = np.flatnonzero(np.append(network.is_kept[contact], False))
     position = np.searchsorted(kept, np.arange(len(contact) + 1))
     return np.append(-1, kept)[position].astype(np.int32)
 
 
 def _num_extensions(network: Network, contact: Ints, first: Ints) -> float:
-    """Return how often paths are extended by a task, about, in all layers together."""
+    """Return about how often paths are extended by a task, in all layers together."""
     m = len(network.site)
     begins = np.append(0, contact)[first + 1]
     num_tasks = int((np.append(contact, m) - begins).sum())
@@ -158,7 +158,7 @@ def _num_extensions(network: Network, contact: Ints, first: Ints) -> float:
 def _down_s(
     problem: Problem, satellite: SatelliteProblem, contacts: Ints, volume: Floats, step: float
 ) -> Floats:
-    """Return when contacts have taken down so many steps; infinite for what they have no time for.
+    """Return when contacts have taken down 0, 1, 2, ... steps; see ``Queues``.
 
     Shape ``(num_contacts, num_steps)``.
     """

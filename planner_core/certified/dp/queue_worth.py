@@ -1,4 +1,4 @@
-"""What a task adds to a path whose images wait for contacts, and what the whole must gain."""
+"""What a task adds to a path whose images wait for contacts, and what the whole path must gain."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from planner_core.problem import Floats, Ints
 
 @inner
 def know(q: Queues, k: int, layer: int, at: int, earned: Ints, needed: Floats) -> None:
-    """Fill in what a task adds at a level after it, and what a whole path must gain more than.
+    """Fill in what a task adds at a listed level after it, and what the whole path must exceed.
 
-    -1 units where no path needs to take it. What is on board takes a part of contacts, which
-    completions count as a whole.
+    A task that no path needs to take adds -1 units. Data on board takes up a part of contacts,
+    which completions count in full: the path must gain that much more.
     """
     is_end, num_levels = q.number[k] == layer, q.data.num_levels
     level, promised = level_of(q, top_of(q, layer), at)
@@ -37,7 +37,7 @@ def know(q: Queues, k: int, layer: int, at: int, earned: Ints, needed: Floats) -
 
 @inlined
 def _taken_up(q: Queues, layer: int, is_end: bool, promised: int, amount: float) -> float:
-    """Return the multipliers of contacts for what is on board and has to come down in them."""
+    """Return what contacts' multipliers charge for data on board that must come down in them."""
     paid = 0.0
     if not is_end and layer < len(q.contact):
         first = min(amount, q.volume[layer] - DOWN)
@@ -50,7 +50,7 @@ def _taken_up(q: Queues, layer: int, is_end: bool, promised: int, amount: float)
 
 @inner
 def _down_s(q: Queues, layer: int, promised: int, amount: float) -> float:
-    """Return when so much of a queue may be down; infinite for never."""
+    """Return when this amount of a queue may be down; infinite for never."""
     if layer == len(q.contact):
         return np.inf
     at = int(amount / q.step)
@@ -68,9 +68,9 @@ def _down_s(q: Queues, layer: int, promised: int, amount: float) -> float:
 
 @inlined
 def _later_down_s(q: Queues, after: int, at: int) -> float:
-    """Return when so many steps may be down by a contact from ``after`` on, or by several.
+    """Return when ``at`` steps may be down by a contact from ``after`` on, or by several.
 
-    A level that a contact takes down as a whole, by its rounding, may need another one too.
+    A level that a contact takes down as a whole only by rounding may need another contact too.
     """
     earliest_s, is_short = np.inf, False
     for contact in range(after, len(q.contact)):

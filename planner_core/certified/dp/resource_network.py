@@ -1,9 +1,9 @@
 r"""One satellite's tasks as a network on which plans under battery and recorder are paths.
 
-Levels are held less what idle time adds up to: energy :math:`E = p - C(t)` with the charge
+What idle time adds up to is subtracted from levels: energy :math:`E = p - C(t)` with the charge
 :math:`C` of all sunlit seconds so far, data :math:`G = d - b\,t` with the telemetry rate
-:math:`b`. Idling is then free, and both dynamics of ``planner_core.mdp.track`` become one step:
-task ``j`` may be taken from :math:`(E, G)` where :math:`G \le` ``data_before[j]``, and leaves
+:math:`b`. Idling is then free, and both dynamics of ``mdp.resource_columns`` become one step:
+task ``j`` may be taken from :math:`(E, G)` if :math:`G \le` ``data_before[j]``, and leaves
 
 * :math:`E' = \min(E,` ``energy_cap[j]`` :math:`) -` ``energy_cost[j]`` :math:`\ge`
   ``energy_floor[j]``,
@@ -11,12 +11,12 @@ task ``j`` may be taken from :math:`(E, G)` where :math:`G \le` ``data_before[j]
   ``data_after[j]``.
 
 After ``i`` the satellite goes straight on to one of its near followers, or it idles: from row
-``idle_from[i]`` on every task may follow, so that it no longer matters which the last one was.
+``idle_from[i]`` on every task may follow, so that it no longer matters which task was the last.
 
-Where the sun needs turns, :math:`C` is taken when the sun is reached after ``i`` and when it is
-left for ``j``. Where that leaves no time at the sun the difference is negative, which would take
-charge away: such arcs give it back, :math:`E' = \min(E +` ``give`` :math:`, ...)`, and from row
-``idle_from[i]`` on there are none of them.
+If pointing at the sun needs turns, :math:`C` is taken when the sun is reached after ``i`` and when
+it is left for ``j``. If that leaves no time at the sun the difference is negative, which would take
+charge away: such arcs give it back, :math:`E' = \min(E +` ``give`` :math:`, ...)`, and none of
+them leads to row ``idle_from[i]`` or a later one.
 """
 
 from __future__ import annotations
@@ -54,19 +54,19 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 
 @bundle
 class Network(NamedTuple):
-    """Tasks and arcs of one satellite, relaxed by a hair; shape ``(m,)`` unless said otherwise.
+    """Tasks and arcs of one satellite, limits off by a hair; shape ``(m,)`` unless said otherwise.
 
     ``near_rows[near_first[i] : near_first[i + 1]]`` are the rows below ``idle_from[i]`` that
     may follow ``i``, ``near_give`` what these arcs give back; ``straight_*`` list the same arcs by
-    the later row. ``by_idle`` has all rows in order of ``idle_from``. A path that passes by a row
-    with ``is_kept`` is none. ``energy_from`` and ``energy_to`` are what idle time adds up to
-    before it begins after a task, and when it ends at one.
+    the later row. ``by_idle`` lists all rows in order of ``idle_from``. Every path must take the
+    rows with ``is_kept``. ``energy_from`` and ``energy_to`` are what idle time adds up to when it
+    begins after a task, and when it ends at one.
 
-    Where images count on the ground alone, no best plan takes one that stays on board: without it
-    no other comes down later. With row ``i`` as the last image its data may end at ``delivered[i]``
-    at most, which is telemetry younger than that image. ``must_deliver`` says so where dropping
-    an image makes no turn impossible. Where images on board earn a share, data that a recorder
-    holds at the end costs ``left_cost``, of worth for a full one.
+    If images count on the ground alone, some best plan takes none that stays on board: without it
+    no other comes down later. With row ``i`` as the last image, data may end at ``delivered[i]`` at
+    most, which is telemetry younger than that image. ``must_deliver`` says that this applies, which
+    needs that dropping an image makes no turn impossible. If images on board earn a share, data on
+    board at the end costs ``left_cost``, the worth that a full recorder loses.
     """
 
     site: Ints
@@ -113,9 +113,9 @@ def strict_network_of(problem: Problem, satellite: SatelliteProblem) -> Network:
 
 
 def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
-    """Return a network; limits are passed by ``slack`` (negative: kept clear of).
+    """Return a network with limits relaxed by ``slack`` (tightened if it is negative).
 
-    Searches ask for it again wherever worths or what is kept have changed: all else is made once.
+    Searches call this again whenever worths or kept tasks have changed: all else is built once.
     """
     made = _made.setdefault(satellite, {})
     kind = problem.use_resources, problem.dynamics, slack
@@ -131,7 +131,7 @@ def _network(problem: Problem, satellite: SatelliteProblem, slack: float) -> Net
 
 
 def _without_worth(problem: Problem, satellite: SatelliteProblem, slack: float) -> Network:
-    """Return a network without what worths and pins decide."""
+    """Return a network without what depends on worths and pins."""
     track = resource_columns(problem, satellite)
     precedence = direct_precedence(satellite)
     charge_from = track.charge_per_s * track.charge_from_s
@@ -183,18 +183,18 @@ def _without_worth(problem: Problem, satellite: SatelliteProblem, slack: float) 
 
 
 def must_deliver(problem: Problem, satellite: SatelliteProblem) -> bool:
-    """Return whether plans hold only images that come down, what they must take, and little else.
+    """Return whether to admit only plans whose images come down, except those that must be taken.
 
-    That is how some best plan is where images count on the ground alone.
+    Some best plan is of this kind if images count on the ground alone.
     """
     is_asked = problem.objective.is_delivered or problem.leaves_none_on_board
     return is_asked and problem.counts_delivery and is_transitive_on(satellite)
 
 
 def left_cost(problem: Problem, satellite: SatelliteProblem) -> float:
-    """Return what images that fill a recorder lose if they stay on board, as the typical one does.
+    """Return what images that fill a recorder lose if they stay on board, at the typical rate.
 
-    0 where that hangs on when they come down, or none may stay.
+    0 if that depends on when they come down, or if none may stay.
     """
     if problem.objective.half_life_s is not None or must_deliver(problem, satellite):
         return 0.0
@@ -206,7 +206,7 @@ def left_cost(problem: Problem, satellite: SatelliteProblem) -> float:
 def worth_before_left(problem: Problem) -> Floats:
     """Return what images earn before ``left_cost`` is paid for those on board. Shape ``(n,)``.
 
-    No less than they earn either way: one that no contact follows is worth what it is on board.
+    No less than they earn, down or on board: one that no contact follows earns its worth on board.
     """
     worth, lost = problem.worth.copy(), lost_on_board(problem)
     for satellite in problem.satellites:
@@ -225,12 +225,12 @@ def image_size(satellite: SatelliteProblem) -> Floats:
 def _delivered(
     problem: Problem, satellite: SatelliteProblem, emptied: Floats, slack: float
 ) -> Floats:
-    """Return the data at the end with each row as the last image; see ``Network``."""
+    """Return the most data at the end with each row as the last image; see ``Network``."""
     fill = image_size(satellite)
     kept = problem.kept_local(satellite)
     kept = kept[satellite.kind[kept] == COLLECT]
     if slack == 0.0:
-        # A plan brings down what it must take, too, where that is possible.
+        # A plan also brings down the images that it must take, if that is possible.
         kept = kept[problem.worth[satellite.rows[kept]] == 0.0]
     delivered = emptied + float(fill[kept].sum()) + 3.0 * slack
     delivered[kept] = ANY_LEVEL
@@ -238,13 +238,13 @@ def _delivered(
 
 
 def _sources(first: Longs) -> Ints:
-    """Return the task that each arc of a list by tasks belongs to."""
+    """Return the task of each arc in a list of arcs by task."""
     return np.repeat(np.arange(len(first) - 1, dtype=np.int32), np.diff(first))
 
 
 @kernel
 def _arcs(precedence: Precedence, charged_from: Longs) -> tuple[Ints, Longs, Ints]:
-    """Return from where on everything may follow each task for nothing, and what may before."""
+    """Return from which row on all may follow each task by idling, and its arcs to rows before."""
     m = len(precedence.near_from)
     idle_from = np.empty(m, dtype=np.int32)
     first = np.zeros(m + 1, dtype=np.int64)
@@ -281,7 +281,7 @@ def may_be_next(network: Network, i: int, k: int) -> bool:
 
 @inlined
 def give_between(network: Network, i: int, k: int) -> float:
-    """Return what the arc from row ``i`` to ``k`` gives back; nothing from the start, ``i`` < 0."""
+    """Return what the arc from row ``i`` to ``k`` gives back; 0 from the start (``i`` < 0)."""
     if i < 0 or k >= network.idle_from[i]:
         return 0.0
     for at in range(network.near_first[i], network.near_first[i + 1]):
@@ -292,7 +292,7 @@ def give_between(network: Network, i: int, k: int) -> float:
 
 @kernel
 def cost_on_board(network: Network, taken: Bools) -> float:
-    """Return what data costs that is left after some rows, beyond what there is without any."""
+    """Return the cost of the data left after some rows, beyond what is on board at the start."""
     if network.left_cost == 0.0:
         return 0.0
     data = network.data_start
@@ -323,7 +323,7 @@ def part_of(network: Network, rows: Ints) -> Network:
         near_give=near_give,
         straight_first=straight_first,
         straight_rows=straight_rows,
-        # Arcs stand in order of the earlier row, and so they do among those to one later row.
+        # Arcs are in order of the earlier row, and so are those to one later row.
         straight_give=near_give[np.argsort(near_rows, kind="stable")],
         **of_rows,
     )
@@ -331,7 +331,7 @@ def part_of(network: Network, rows: Ints) -> Network:
 
 @kernel
 def _arcs_among(network: Network, rows: Ints) -> tuple[Longs, Ints, Floats]:
-    """Return the arcs among some rows, and what they give back."""
+    """Return the arcs among some rows, and the energy that they give back."""
     m = len(rows)
     new_row = np.empty(len(network.site), dtype=np.int32)
     for row in range(len(new_row)):

@@ -1,8 +1,8 @@
 """One satellite's tasks with continuous starts, cut into cells of starts.
 
-What labels over these cells need of each task is told once: the tasks that it can lead to, the bit
-by which it is remembered while its access is open, and by how much a chain that leaves a task out
-is earlier.
+What labels over these cells need is computed once: the tasks that each task can lead to, the bit by
+which it is remembered while its access is open, and how much earlier a chain is that leaves a task
+out.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ class Cells(NamedTuple):
     bit
         By which a task is remembered while its access is open; 0 for not at all. Shape ``(n,)``.
     opened
-        What opens in each second and the 0, 1, 3, 7, ... seconds after it.
+        Bits of the accesses that open in each second and the 0, 1, 3, 7, ... seconds after it.
     alive
-        What is open at some time of each second.
+        Bits of the accesses that are open at some time of each second.
     is_first
         Whether the task may come first: no other one can be done before it.
     spare_s
-        How much later a chain may start that leaves out its next task.
+        How much later a chain may start if it leaves out its next task.
     """
 
     spans: TimeWindows
@@ -60,10 +60,10 @@ class Cells(NamedTuple):
 
 
 def cells_of(spans: TimeWindows, view: View, width_s: float) -> Cells | None:
-    """Return a satellite's cells; None where it turns more slowly than lines of sight do.
+    """Return a satellite's cells; None if it turns no faster than lines of sight do.
 
-    An acceleration limit only makes turns longer: here it is left out, for with it a later
-    start may be the earlier arrival.
+    An acceleration limit only makes turns longer. It is ignored here, because with it a later
+    start may allow an earlier start of the next task.
     """
     view = view._replace(agile=Agile(view.agile.rate_deg_s, INSTANT, view.agile.settle_s))
     share = greatest_rate_deg_s(spans, view) / view.agile.rate_deg_s
@@ -96,8 +96,8 @@ def cells_of(spans: TimeWindows, view: View, width_s: float) -> Cells | None:
 def greatest_rate_deg_s(spans: TimeWindows, view: View) -> float:
     """Return a rate that the lines of sight of tasks never exceed.
 
-    The mean rate of each second, and what the rate can gain within one: the second derivative
-    of a direction is at most twice the square of its rate and acceleration over range.
+    It is the mean rate over a second, plus what the rate can gain within one: the second derivative
+    of a direction is at most twice the square of its rate, plus acceleration over range.
     """
     most = 0.0
     for i in range(len(spans.open_s)):
@@ -123,12 +123,12 @@ def greatest_rate_deg_s(spans: TimeWindows, view: View) -> float:
 
 @kernel
 def _bits(spans: TimeWindows) -> Masks:
-    """Give each task a bit that no other one has while both accesses are open."""
+    """Return a bit for each task that no other one has while both accesses are open; 0 for none."""
     bit = np.zeros(len(spans.open_s), dtype=np.uint64)
     free_s = np.full(64, -np.inf)
     for i in range(len(spans.open_s)):
         for b in range(64):
-            # Whole seconds apart, as the table of what opens counts them.
+            # Whole seconds apart, because ``opened`` counts in seconds.
             if free_s[b] < math.floor(spans.open_s[i]) - 1.0:
                 free_s[b] = spans.close_s[i] + spans.length_s[i]
                 bit[i] = np.uint64(1) << np.uint64(b)
@@ -160,7 +160,7 @@ def _alive(spans: TimeWindows, bit: Masks, num_seconds: int) -> Masks:
 
 @kernel
 def _first_tasks(spans: TimeWindows, view: View) -> npt.NDArray[np.bool_]:
-    """Return which tasks no other one can precede; a chain may begin with those alone."""
+    """Return which tasks no other one can precede; only those may begin a chain."""
     n = len(spans.open_s)
     is_first = np.ones(n, dtype=np.bool_)
     agile = view.agile

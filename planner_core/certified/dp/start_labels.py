@@ -1,17 +1,17 @@
-r"""The heaviest path of one satellite when starts are free: labels over cells of starts.
+r"""The heaviest path of one satellite with continuous starts: labels over cells of starts.
 
 A label at a cell of a task says: some chain of tasks that ends with this one, begun at
 ``start_s`` or later in this cell, is worth at most ``value``, and holds at least the tasks in
-``mask`` whose accesses are still open. Labels go on to the tasks of the table of earliest starts.
-Each step only errs on one side:
+``mask`` whose accesses are still open. Labels are extended by the tasks in the table of earliest
+starts. Each step errs on one side only:
 
-* A label is left out only where another one is at least as good: it is worth as much, without
+* A label is left out only if another one dominates it: that one is worth as much, even without
   the tasks that it alone remembers, and starts no later. Or it starts later by no more than
   m tasks can make up for, and is worth m of the heaviest tasks more: it leaves out the next m
   tasks of the other's chain and is in time again. (A task left out saves its length, during which
   lines of sight turn by no more than the greatest rate: see ``spare_s``.)
-* Where a cell has no room for another label two become one with the greater value, the
-  earlier start and what both remember.
+* If a cell has no room for another label, two are merged into one with the greater value, the
+  earlier start and the tasks that both remember.
 * A task that is remembered is passed through unpaid; one that is forgotten is paid again.
 
 So the greatest value of all labels is never below the heaviest chain that takes no task twice.
@@ -48,7 +48,7 @@ _PER_TASK_S: Final = TUNING.tidy_s
 
 @bundle
 class Labels(NamedTuple):
-    """Labels of all cells, ``most`` to a cell; of each cell the first ``used``."""
+    """Labels of all cells, with room for ``most`` in each, of which the first ``used`` are set."""
 
     used: Ints
     value: Floats
@@ -60,7 +60,7 @@ class Labels(NamedTuple):
 
 
 def labels_of(cells: Cells, most: int) -> Labels:
-    """Return room for labels."""
+    """Return storage for labels."""
     n = len(cells.order)
     return Labels(
         used=np.zeros(n, dtype=np.int32),
@@ -77,7 +77,7 @@ def labels_of(cells: Cells, most: int) -> Labels:
 def heaviest(
     cells: Cells, weight: Floats, labels: Labels, most: int, is_exact: bool
 ) -> tuple[float, int]:
-    """Return what no chain exceeds, and the label that is worth that; -1 for none.
+    """Return a value that no chain exceeds, and the label that has it; -1 for none.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def heaviest(
     most
         Labels that a cell has room for.
     is_exact
-        Otherwise arrivals are estimates, which is quick and no bound.
+        Otherwise earliest starts are estimated, which is quick but proves no bound.
     """
     spans, view, earliest = cells.spans, cells.eye, cells.earliest
     width_s = earliest.width_s
@@ -108,7 +108,7 @@ def heaviest(
         cell = cells.order[at]
         task = cells.task[cell]
         edge = spans.open_s[task] + (cell - earliest.first_cell[task]) * width_s
-        # The task that each bit stands for, in the cells that lie ahead.
+        # The weight of the task that each bit stands for in the cells that lie ahead.
         while next_open < len(weight) and spans.open_s[next_open] <= edge + width_s:
             if cells.bit[next_open] != _NONE:
                 labels.bit_weight[_number_of(cells.bit[next_open])] = weight[next_open]
@@ -151,9 +151,9 @@ def heaviest(
 
 @borrowing_inner
 def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s: float) -> float:
-    """Return an instant that the earliest start of a task after another is not before.
+    """Return a lower bound on the earliest start of a task after another one.
 
-    That is the guess, less a moment, if the satellite cannot be there by then.
+    It is the guess less ``EARLIER_S`` if the satellite cannot have turned by then.
     """
     spans, eye = cells.spans, cells.eye
     first_s = max(end_s + eye.agile.settle_s, spans.open_s[task])
@@ -172,7 +172,7 @@ def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s:
 
 @borrowing_inner
 def _left_open(cells: Cells, mask: np.uint64, from_s: float, into: int, other: int) -> np.uint64:
-    """Return what a chain still remembers at the right edge of the cell it goes into."""
+    """Return what a chain still remembers at the right edge of the cell that it enters."""
     if mask == _NONE:
         return mask
     earliest = cells.earliest
@@ -207,14 +207,14 @@ def _is_as_good(
     late_s: float,
     extra: np.uint64,
 ) -> bool:
-    """Return whether a label makes another one needless.
+    """Return whether a label dominates another one.
 
     Parameters
     ----------
     slack, late_s
         By how much it is worth more, and starts later.
     extra
-        What it remembers and the other does not.
+        The tasks that it remembers and the other does not.
     """
     if late_s > 0.0:
         slack -= heaviest_task * math.ceil(late_s / cells.spare_s)
@@ -258,9 +258,9 @@ def _insert(
     parent: int,
     is_paid: bool,
 ) -> None:
-    """Add a label to a cell, unless others are as good.
+    """Add a label to a cell, unless another one dominates it.
 
-    ``scale`` is the worth of the heaviest task, and about what a second is worth.
+    ``scale`` is the worth of the heaviest task, and roughly what a second is worth.
     """
     heaviest_task, per_second = scale
     if _is_covered(cells, labels, most, heaviest_task, cell, value, start_s, mask):
