@@ -29,13 +29,13 @@ from planner_core.problem import (
     Longs,
     Pinned,
     Problem,
-    StruckCollects,
+    RuledOutCollects,
 )
 from planner_core.problem.first_turns import too_soon
 from planner_core.problem.on_board import imaged_before
 from planner_core.problem.restrict import restricted
+from planner_core.problem.ruled_out import HEADING, OUTAGE, PIN
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.problem.struck import HEADING, OUTAGE, PIN
 from planner_core.problem.transitions import may_follow_each
 
 Reasons = npt.NDArray[np.int8]
@@ -52,17 +52,19 @@ def apply_pins(problem: Problem, pinned: Pinned) -> Problem:
     """
     pinned = replace(pinned, kept=_without_repeats(pinned.kept))
     in_outage, is_too_soon = rows_in_outages(problem, pinned), too_soon(problem)
-    is_struck = _ruled_out(problem, pinned, in_outage | is_too_soon)
-    _check_conflicts(problem, pinned, is_struck, is_too_soon)
+    is_ruled_out = _ruled_out(problem, pinned, in_outage | is_too_soon)
+    _check_conflicts(problem, pinned, is_ruled_out, is_too_soon)
     beside = excluded_by_kept(problem, pinned.kept)
-    is_struck[beside.row] = True
-    left = np.flatnonzero(~is_struck).astype(np.int32)
+    is_ruled_out[beside.row] = True
+    left = np.flatnonzero(~is_ruled_out).astype(np.int32)
     part = restricted(replace(problem, pinned=pinned), left)
     why = np.where(in_outage, OUTAGE, np.where(is_too_soon, HEADING, PIN)).astype(np.int8)
     part = replace(
         part,
         pinned=replace(
-            part.pinned, skipped={}, struck=_struck(problem, pinned, is_struck, beside, why)
+            part.pinned,
+            skipped={},
+            ruled_out=_ruled_out_collects(problem, pinned, is_ruled_out, beside, why),
         ),
         target_access=_access_left(problem, part),
     )
@@ -205,12 +207,12 @@ def rows_in_outages(problem: Problem, pinned: Pinned) -> Bools:
     return is_out
 
 
-def _struck(
-    problem: Problem, pinned: Pinned, is_struck: Bools, beside: Beside, why: Reasons
-) -> StruckCollects:
+def _ruled_out_collects(
+    problem: Problem, pinned: Pinned, is_ruled_out: Bools, beside: Beside, why: Reasons
+) -> RuledOutCollects:
     """Return the collects that are ruled out."""
     table = problem.opportunities
-    rows = np.flatnonzero(is_struck & (table.kind == COLLECT))
+    rows = np.flatnonzero(is_ruled_out & (table.kind == COLLECT))
     rows = rows[np.argsort(table.site[rows], kind="stable")]
     # An opportunity may conflict with several kept actions: find its pairs in ``beside``.
     order = np.argsort(beside.row, kind="stable")
@@ -219,8 +221,8 @@ def _struck(
     first_kept = np.concatenate([[0], np.cumsum(count)])
     at = np.arange(first_kept[-1]) - np.repeat(first_kept[:-1] - first, count)
     kept = np.array([one.row for one in pinned.kept], dtype=np.int64)
-    row_after = np.cumsum(~is_struck) - 1
-    return StruckCollects(
+    row_after = np.cumsum(~is_ruled_out) - 1
+    return RuledOutCollects(
         target=table.site[rows],
         row=(rows if problem.origin is None else problem.origin[rows]).astype(np.int32),
         satellite=table.satellite[rows],

@@ -71,13 +71,13 @@ def at_the_same_time(problem: Problem, rows: npt.NDArray[np.integer]) -> list[li
     return [sorted(one) for one in [*found, running] if one]
 
 
-def antenna_tolls(problem: Problem, multipliers: Floats | None) -> Floats:
+def antenna_charges(problem: Problem, multipliers: Floats | None) -> Floats:
     """Return what each opportunity pays for antennas at these multipliers. Shape ``(n,)``."""
-    tolls = np.zeros(len(problem.opportunities))
+    charges = np.zeros(len(problem.opportunities))
     if multipliers is not None:
         for group, multiplier in zip(antenna_groups(problem), multipliers.tolist(), strict=True):
-            tolls[group.rows] += max(multiplier, 0.0)
-    return tolls
+            charges[group.rows] += max(multiplier, 0.0)
+    return charges
 
 
 def paid_for_antennas(problem: Problem, multipliers: Floats | None) -> float:

@@ -74,7 +74,7 @@ def view_of(problem: Problem, index: int) -> View:
     return View(pointing.paths[index], sites_m, agile)
 
 
-def spans_of(problem: Problem, index: int) -> TimeWindows:
+def time_windows_of(problem: Problem, index: int) -> TimeWindows:
     """Return the windows of one satellite's collects: its accesses, or what pins leave of them."""
     table, pinned = problem.opportunities, problem.pinned
     rows = problem.satellites[index].rows

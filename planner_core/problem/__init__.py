@@ -29,8 +29,8 @@ from planner_core.problem.problem import (
     Sunlight,
     line_of_sight,
 )
+from planner_core.problem.ruled_out import RuledOut, RuledOutCollects
 from planner_core.problem.satellite import build_satellite_problem
-from planner_core.problem.struck import Struck, StruckCollects
 from planner_core.problem.transitions import Transitions, may_follow
 
 __all__ = [
@@ -59,11 +59,11 @@ __all__ = [
     "PassRates",
     "Pinned",
     "Problem",
+    "RuledOut",
+    "RuledOutCollects",
     "SatelliteProblem",
     "Singles",
     "StationLinks",
-    "Struck",
-    "StruckCollects",
     "Sunlight",
     "Transitions",
     "build_satellite_problem",

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from planner_core.problem.columns import CONTACT
+from planner_core.problem.ruled_out import RuledOutCollects, nothing_ruled_out
 from planner_core.problem.slew import TIME_TOLERANCE_S
-from planner_core.problem.struck import StruckCollects, nothing_struck
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class Pinned:
         Rows still in the table that no plan may take, each with the pin that says so.
     forbidden
         Targets that no plan may collect.
-    struck
+    ruled_out
         The collects that were ruled out.
     frozen_until_s
         Tasks that start before it are kept or cannot be taken; None unless the plan follows
@@ -74,7 +74,7 @@ class Pinned:
     skipped: Mapping[int, str] = field(default_factory=dict)
     blocked: tuple[Blocked, ...] = ()
     forbidden: frozenset[int] = frozenset()
-    struck: StruckCollects = field(default_factory=nothing_struck)
+    ruled_out: RuledOutCollects = field(default_factory=nothing_ruled_out)
     frozen_until_s: float | None = None
 
     @property

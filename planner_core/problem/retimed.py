@@ -64,7 +64,7 @@ def retimed(problem: Problem, rows: Ints, start_s: Floats) -> Retimed:
         kept=tuple(
             replace(k, row=int(place[k.row])) for k in problem.pinned.kept if place[k.row] >= 0
         ),
-        struck=problem.pinned.struck.placed(place),
+        ruled_out=problem.pinned.ruled_out.placed(place),
     )
     made = with_table(
         problem, part, pinned=pinned, origin=rows, events=[None] * len(problem.satellites)

@@ -135,12 +135,12 @@ def _ruled_out(problem: Problem, plan: Plan, target: int) -> list[Attempt]:
     return [
         Attempt(
             opportunity=None,
-            scenario_row=struck.row,
-            satellite=struck.satellite,
-            start_s=struck.start_s,
-            end_s=struck.end_s,
-            displaces=tuple(sorted(positions[row] for row in struck.kept if row in positions)),
+            scenario_row=ruled_out.row,
+            satellite=ruled_out.satellite,
+            start_s=ruled_out.start_s,
+            end_s=ruled_out.end_s,
+            displaces=tuple(sorted(positions[row] for row in ruled_out.kept if row in positions)),
             ruled_out=True,
         )
-        for struck in problem.pinned.struck.get(target, ())
+        for ruled_out in problem.pinned.ruled_out.get(target, ())
     ]

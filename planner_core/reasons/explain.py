@@ -153,12 +153,12 @@ def _without_opportunity(problem: Problem, positions: Mapping[int, int], target:
     detail = NO_ACCESS.get(int(problem.target_access[target]))
     if detail is not None:
         return Reason(code="no_access", certainty="proven", detail=detail)
-    struck = problem.pinned.struck.get(target, ())
-    if struck and all(each.why == "outage" for each in struck):
+    ruled_out = problem.pinned.ruled_out.get(target, ())
+    if ruled_out and all(each.why == "outage" for each in ruled_out):
         return Reason(code="outage", certainty="proven", detail=_OUT)
-    if struck and all(each.why == "heading" for each in struck):
+    if ruled_out and all(each.why == "heading" for each in ruled_out):
         return Reason(code="slew_conflict", certainty="proven", detail=_TOO_SOON)
-    kept = {row for each in struck for row in each.kept}
+    kept = {row for each in ruled_out for row in each.kept}
     if not kept:
         return Reason(code="excluded", certainty="proven", detail=_BLOCKED)
     return Reason(

@@ -25,7 +25,7 @@ from planner_core.certified.strategies.resource_fleet import FleetAscent
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Dynamics, Objective, Resources
-from planner_core.precedence.antennas import antenna_groups, antenna_tolls, paid_for_antennas
+from planner_core.precedence.antennas import antenna_charges, antenna_groups, paid_for_antennas
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
@@ -111,8 +111,8 @@ def test_no_plan_beats_any_multipliers_of_antennas(
             for unit in (1.0, 0.1):
                 assert resource_value(problem, multipliers, unit, antenna) >= best - 1e-9
         else:
-            tolls = rng.uniform(0.0, 10.0, num_contacts)
-            assert latency_value(problem, multipliers, tolls, antenna) >= best - 1e-9
+            charges = rng.uniform(0.0, 10.0, num_contacts)
+            assert latency_value(problem, multipliers, charges, antenna) >= best - 1e-9
 
 
 def test_multipliers_tell_that_one_of_two_satellites_is_served() -> None:
@@ -278,7 +278,7 @@ def test_a_path_pays_for_its_contacts() -> None:
         assert most == 3 == worth[one.satellite.rows[path]].sum()
         assert len(path) == 3
     assert paid_for_antennas(problem, antenna) == 0.25
-    assert antenna_tolls(problem, antenna).sum() == 0.5
+    assert antenna_charges(problem, antenna).sum() == 0.5
     assert resource_value(problem, multipliers, 0.25, antenna) == pytest.approx(2.0 + 0.25 + 1.5)
 
 

@@ -24,7 +24,7 @@ from planner_core.certified.multipliers.queues import multipliers_by_queues
 from planner_core.certified.proofs import queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
-from planner_core.certified.proofs.latency import Tolls, latency_relaxations, latency_value
+from planner_core.certified.proofs.latency import ContactCharges, latency_relaxations, latency_value
 from planner_core.certified.proofs.queues import is_supported, queue_value
 from planner_core.domain import Objective
 from planner_core.problem import CONTACT, Floats, Problem
@@ -108,9 +108,9 @@ def test_what_follows_a_contact_and_what_leads_to_it_add_up_to_a_whole_path(
     (one,) = latency_relaxations(problem)
     rng = np.random.default_rng(seed)
     multiplier = np.append(rng.uniform(0.0, 0.5, len(problem.target_ids)), 0.0)
-    tolls = Tolls(rng.uniform(0.0, 1.0, len(one.contacts)), np.zeros(len(one.contacts)))
-    most, path, _ = one.most(multiplier, tolls)
-    found = one.most_by_pairs(multiplier, tolls)
+    charges = ContactCharges(rng.uniform(0.0, 1.0, len(one.contacts)), np.zeros(len(one.contacts)))
+    most, path, _ = one.most(multiplier, charges)
+    found = one.most_by_pairs(multiplier, charges)
     assert found is not None
     pairs, _ = found
     assert pairs.max() == pytest.approx(most, abs=1e-9)

@@ -27,7 +27,7 @@ from planner_core.certified.strategies.every import solved
 from planner_core.certified.tuning import TUNING
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
-from planner_core.precedence.time_windows import spans_of, view_of
+from planner_core.precedence.time_windows import time_windows_of, view_of
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -63,7 +63,7 @@ def best_reward(problem: Problem) -> float:
 
     It turns faster than its lines of sight, so each task is best begun as early as it can be.
     """
-    spans, view = spans_of(problem, 0), view_of(problem, 0)
+    spans, view = time_windows_of(problem, 0), view_of(problem, 0)
     reward = problem.best_worth
     best = 0.0
 
@@ -319,7 +319,7 @@ def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
     timeline = replay(pinned, search.plan)
     assert not timeline.violations
     assert any(a.opportunity == kept for a in search.plan.actions)
-    spans = spans_of(pinned, 0)
+    spans = time_windows_of(pinned, 0)
     is_before = spans.close_s + spans.length_s <= from_s + 1e-6
     assert (is_before | (spans.open_s >= from_s + 60.0 - 1e-6)).all()
 

@@ -302,8 +302,8 @@ def test_an_explanation_names_what_pins_have_ruled_out() -> None:
     assert kept.opportunity is not None
     pins = Pins(keep=(PinnedAction(opportunity_id=f"o{kept.opportunity}"),))
     other = judged(replace(plan.scenario, pins=pins), Rule(), computed=computed())
-    assert other.problem.pinned.struck
-    for target, struck in other.problem.pinned.struck.items():
+    assert other.problem.pinned.ruled_out
+    for target, struck in other.problem.pinned.ruled_out.items():
         if target in other.timeline.collected:
             continue
         found = explain_target(other.problem, other.solution.plan, other.timeline, target)

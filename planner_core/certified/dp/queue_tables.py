@@ -23,7 +23,7 @@ class Fixing(NamedTuple):
     layers, weight
         Those of ``contact_layers``, each contact with a layer of its own, and what tasks are worth
         in them. The latter has shape ``(num_contacts + 1, m)``; ``(0, 0)`` if nothing is fixed.
-    toll
+    charge
         The multiplier of each contact, by volume. Shape ``(num_contacts,)``.
     after_contact
         The most that may be gained after each contact, by energy. Shape ``(num_contacts, width)``.
@@ -33,7 +33,7 @@ class Fixing(NamedTuple):
 
     layers: Layers
     weight: Floats
-    toll: Floats
+    charge: Floats
     after_contact: Floats
     least: float
 

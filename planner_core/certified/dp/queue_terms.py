@@ -134,7 +134,7 @@ def _nothing_fixed(network: Network) -> Fixing:
     return Fixing(
         layers=layers_of(network),
         weight=np.zeros((0, 0)),
-        toll=none,
+        charge=none,
         after_contact=np.zeros((0, 0)),
         least=-np.inf,
     )

@@ -41,10 +41,10 @@ def _taken_up(q: Queues, layer: int, is_end: bool, promised: int, amount: float)
     paid = 0.0
     if not is_end and layer < len(q.contact):
         first = min(amount, q.volume[layer] - DOWN)
-        paid, amount = q.fixing.toll[layer] * first, amount - first
+        paid, amount = q.fixing.charge[layer] * first, amount - first
     after = layer + promised
     if 0 < promised < q.num_classes and after < len(q.contact):
-        paid += q.fixing.toll[after] * min(amount, q.volume[after] - DOWN)
+        paid += q.fixing.charge[after] * min(amount, q.volume[after] - DOWN)
     return paid
 
 

@@ -48,7 +48,7 @@ class Cells(NamedTuple):
     """
 
     spans: TimeWindows
-    eye: View
+    pointing: View
     earliest: EarliestStarts
     order: Ints
     task: Ints
@@ -80,7 +80,7 @@ def cells_of(spans: TimeWindows, view: View, width_s: float) -> Cells | None:
     num_seconds = int((spans.close_s + spans.length_s).max(initial=0.0)) + 2
     return Cells(
         spans=spans,
-        eye=view,
+        pointing=view,
         earliest=earliest,
         order=np.argsort(edge_s, kind="stable").astype(np.int32),
         task=task,

@@ -88,7 +88,7 @@ def heaviest(
     is_exact
         Otherwise earliest starts are estimated, which is quick but proves no bound.
     """
-    spans, view, earliest = cells.spans, cells.eye, cells.earliest
+    spans, view, earliest = cells.spans, cells.pointing, cells.earliest
     width_s = earliest.width_s
     top, heaviest_task = 0.0, 0.0
     best = -1
@@ -155,16 +155,16 @@ def _not_after_s(cells: Cells, end_s: float, looked: Vector, task: int, guess_s:
 
     It is the guess less ``EARLIER_S`` if the satellite cannot have turned by then.
     """
-    spans, eye = cells.spans, cells.eye
-    first_s = max(end_s + eye.agile.settle_s, spans.open_s[task])
+    spans, view = cells.spans, cells.pointing
+    first_s = max(end_s + view.agile.settle_s, spans.open_s[task])
     guess_s -= EARLIER_S
     if guess_s <= first_s:
         return float(first_s)
-    looks = sight(eye.path, eye.sites_m, spans.site[task], guess_s)
-    if guess_s < end_s + needed_s(eye.agile, looked, looks):
+    looks = sight(view.path, view.sites_m, spans.site[task], guess_s)
+    if guess_s < end_s + needed_s(view.agile, looked, looks):
         return guess_s
     exact_s: float = earliest_start_s(
-        eye.agile, end_s, looked, eye.path, eye.sites_m,
+        view.agile, end_s, looked, view.path, view.sites_m,
         spans.site[task], spans.open_s[task], spans.close_s[task] + EARLY_S,
     )  # fmt: skip
     return exact_s - EARLY_S

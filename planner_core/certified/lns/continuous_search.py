@@ -20,7 +20,7 @@ from planner_core.precedence.time_windows import (
     TimeWindows,
     View,
     action_of,
-    spans_of,
+    time_windows_of,
     view_of,
 )
 from planner_core.problem import (
@@ -46,7 +46,7 @@ class Satellite:
     def of(cls, problem: Problem, index: int, plan: Plan) -> Satellite:
         """Return a satellite with its part of a plan, in which each target is taken once."""
         table = problem.opportunities
-        spans, view = spans_of(problem, index), view_of(problem, index)
+        spans, view = time_windows_of(problem, index), view_of(problem, index)
         worth = problem.worth[spans.row]
         # A kept task is worth more than all others together, so that no move drops it.
         worth[spans.is_kept] += 1.0 + float(problem.best_worth.sum())

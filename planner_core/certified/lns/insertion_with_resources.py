@@ -22,7 +22,7 @@ from planner_core.precedence.time_windows import (
     TimeWindows,
     View,
     action_of,
-    spans_of,
+    time_windows_of,
     view_of,
     with_contacts,
 )
@@ -86,7 +86,9 @@ def _filled(
     others = [a for a in plan.actions if table.satellite[a.opportunity] != index]
     view = view_of(problem, index)
     contacts = [a.opportunity for a in own if table.kind[a.opportunity] != COLLECT]
-    spans = with_contacts(problem, spans_of(problem, index), np.array(contacts, dtype=np.int32))
+    spans = with_contacts(
+        problem, time_windows_of(problem, index), np.array(contacts, dtype=np.int32)
+    )
     if len(spans.row) == 0:
         return plan
     tasks = [_task_of(problem, spans, action) for action in own]

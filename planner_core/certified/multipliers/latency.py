@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.proofs.latency import Tolls, latency_relaxations, latency_value
+from planner_core.certified.proofs.latency import ContactCharges, latency_relaxations, latency_value
 from planner_core.certified.tolerances import SAME
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.antennas import (
+    antenna_charges,
     antenna_groups,
-    antenna_tolls,
     paid_for_antennas,
 )
 from planner_core.problem import CONTACT, Bytes, Floats, Problem
@@ -46,11 +46,11 @@ class LatencyAscent:
         self._is_contact = problem.opportunities.kind == CONTACT
         self._multipliers = np.zeros(len(begin) + 1)
         # Of each opportunity, for a typical image's data; 0 for collects.
-        self._tolls = np.zeros(len(problem.opportunities))
+        self._charges = np.zeros(len(problem.opportunities))
         self._groups = antenna_groups(problem)
         self._antenna = np.zeros(len(self._groups))
         self._images_per_contact = self._images_that_contacts_take()
-        self._best = self._multipliers, self._tolls, self._antenna
+        self._best = self._multipliers, self._charges, self._antenna
         self._length, self._num_idle = 1.0, 0
         self.contact_sets: dict[tuple[int, ...], None] = {}
         self.value = float(problem.best_worth.sum())
@@ -81,11 +81,11 @@ class LatencyAscent:
     @property
     def contact_multipliers(self) -> Floats:
         """The best multipliers of contacts, by volume. Shape ``(num_contacts,)``."""
-        _, tolls, _ = self._best
-        tolls = tolls.copy()
+        _, charges, _ = self._best
+        charges = charges.copy()
         for one in self._satellites:
-            tolls[one.contacts] /= one.typical
-        by_volume: Floats = tolls[self._is_contact]
+            charges[one.contacts] /= one.typical
+        by_volume: Floats = charges[self._is_contact]
         return by_volume
 
     @property
@@ -125,7 +125,7 @@ class LatencyAscent:
         value = float(multipliers.sum())
         for one in self._satellites:
             free = np.zeros(len(one.contacts))
-            value += one.most(multipliers, Tolls(free, free))[0]
+            value += one.most(multipliers, ContactCharges(free, free))[0]
         return value
 
     def _images_that_contacts_take(self) -> float:
@@ -134,18 +134,20 @@ class LatencyAscent:
 
     def _go_round(self, level: float, stop: Bytes) -> None:
         value = float(self._multipliers.sum()) + paid_for_antennas(self._problem, self._antenna)
-        antenna = antenna_tolls(self._problem, self._antenna)
+        antenna = antenna_charges(self._problem, self._antenna)
         too_many = np.append(-np.ones(len(self._most) - 1), 0.0)
-        too_much = np.zeros(len(self._tolls))
-        is_taken = np.zeros(len(self._tolls), dtype=np.bool_)
+        too_much = np.zeros(len(self._charges))
+        is_taken = np.zeros(len(self._charges), dtype=np.bool_)
         for one in self._satellites:
             if stop[0]:
                 return
-            tolls = Tolls(self._tolls[one.contacts] / one.typical, antenna[one.contacts])
-            gained, path, layer = one.most(self._multipliers, tolls)
+            charges = ContactCharges(
+                self._charges[one.contacts] / one.typical, antenna[one.contacts]
+            )
+            gained, path, layer = one.most(self._multipliers, charges)
             value += gained
             np.add.at(too_many, one.target[path], 1.0)
-            too_much[one.contacts] = one.loads(path, layer, tolls) / one.typical
+            too_much[one.contacts] = one.loads(path, layer, charges) / one.typical
             is_taken[one.rows[path[one.layers.number[path] >= 0]]] = True
         too_many[-1] = 0.0
         contacts = tuple(np.flatnonzero(is_taken).tolist())
@@ -158,14 +160,14 @@ class LatencyAscent:
     def _is_hopeful(self, value: float) -> bool:
         """Note the current value; return False if it leads back to the best multipliers."""
         if value < self.value * (1.0 - SAME):
-            self._best, self._num_idle = (self._multipliers, self._tolls, self._antenna), 0
+            self._best, self._num_idle = (self._multipliers, self._charges, self._antenna), 0
             self.value = value
             return True
         self._num_idle += 1
         if self._num_idle < TUNING.patience:
             return True
         self._length, self._num_idle = TUNING.shorter * self._length, 0
-        self._multipliers, self._tolls, self._antenna = self._best
+        self._multipliers, self._charges, self._antenna = self._best
         return False
 
     def _move(self, above: float, too_many: Floats, too_much: Floats, excess: Floats) -> None:
@@ -177,11 +179,11 @@ class LatencyAscent:
             Of each group of contacts, in images that they can bring down. Shape ``(num_groups,)``.
         """
         too_many = np.where((self._multipliers <= 0.0) & (too_many < 0.0), 0.0, too_many)
-        too_much = np.where((self._tolls <= 0.0) & (too_much < 0.0), 0.0, too_much)
+        too_much = np.where((self._charges <= 0.0) & (too_much < 0.0), 0.0, too_much)
         excess = np.where((self._antenna <= 0.0) & (excess < 0.0), 0.0, excess)
         squares = sum(float(np.square(each).sum()) for each in (too_many, too_much, excess))
         above = min(above, TUNING.far_above * self.value)
         step = self._length * above / squares if squares > 0.0 else 0.0
         self._multipliers = np.clip(self._multipliers + step * too_many, 0.0, self._most)
-        self._tolls = np.maximum(self._tolls + step * too_much, 0.0)
+        self._charges = np.maximum(self._charges + step * too_much, 0.0)
         self._antenna = np.maximum(self._antenna + step * self._images_per_contact * excess, 0.0)

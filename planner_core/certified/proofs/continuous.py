@@ -25,7 +25,7 @@ from planner_core.certified.tuning import TUNING
 from planner_core.precedence.time_windows import (
     TimeWindows,
     part_of,
-    spans_of,
+    time_windows_of,
     view_of,
 )
 from planner_core.problem import (
@@ -70,7 +70,7 @@ def num_followers(problem: Problem, width_s: float) -> float:
     """Return an estimate of how many followers the tables of all satellites have."""
     count = 0.0
     for index in range(len(problem.satellites)):
-        spans = spans_of(problem, index)
+        spans = time_windows_of(problem, index)
         free_s = spans.close_s - spans.open_s
         # About four times as many tasks may come next as are open at a time.
         mean_open = float((free_s + spans.length_s).sum()) / problem.horizon_s
@@ -103,7 +103,7 @@ class ContinuousDual:
         parts = []
         is_offered = np.zeros(len(problem.target_ids), dtype=np.bool_)
         for index in range(len(problem.satellites)):
-            spans = spans_of(problem, index)
+            spans = time_windows_of(problem, index)
             is_offered[spans.site] = True
             for piece in pieces_of(spans):
                 if stop is not None and stop[0]:

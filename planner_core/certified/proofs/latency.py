@@ -38,7 +38,7 @@ from planner_core.certified.signs import NEVER
 from planner_core.certified.tolerances import DOWN, DOWN_S
 from planner_core.certified.tuning import TUNING
 from planner_core.jit import kernel
-from planner_core.precedence.antennas import antenna_tolls, paid_for_antennas
+from planner_core.precedence.antennas import antenna_charges, paid_for_antennas
 from planner_core.precedence.relation import is_transitive_on
 from planner_core.problem import (
     COLLECT,
@@ -78,7 +78,7 @@ class _Terms(NamedTuple):
     half_life_s: float
 
 
-class Tolls(NamedTuple):
+class ContactCharges(NamedTuple):
     """Multipliers of some contacts; shape ``(num_contacts,)``.
 
     Attributes
@@ -170,21 +170,23 @@ class LatencyRelaxation:
             ),
         )
 
-    def most(self, multipliers: Floats, tolls: Tolls) -> tuple[float, Ints, Ints]:
+    def most(self, multipliers: Floats, charges: ContactCharges) -> tuple[float, Ints, Ints]:
         """Return the most that the satellite can gain, a path that gains it, and its layers.
 
         Parameters
         ----------
         multipliers
             Of targets, and a 0 for contacts. Shape ``(num_targets + 1,)``.
-        tolls
+        charges
             Of the satellite's contacts.
         """
-        m, weight = len(self.rows), self._weight(multipliers, tolls)
+        m, weight = len(self.rows), self._weight(multipliers, charges)
         own, num_own = np.empty((m, self.levels.width)), np.zeros(m, dtype=np.int64)
         return most_by_contacts(self.network, self.levels, self.layers, weight, own, num_own)
 
-    def most_by_pairs(self, multipliers: Floats, tolls: Tolls) -> tuple[Floats, Fixing] | None:
+    def most_by_pairs(
+        self, multipliers: Floats, charges: ContactCharges
+    ) -> tuple[Floats, Fixing] | None:
         """Return the most that it can gain with each pair of contacts directly after each other.
 
         See ``contact_pairs.most_by_pairs``. Also returns what tells which states the programme over
@@ -193,33 +195,33 @@ class LatencyRelaxation:
         """
         if len(self.layers.first) <= len(self.contacts):
             return None
-        weight = self._weight(multipliers, tolls)
+        weight = self._weight(multipliers, charges)
         most, after = most_by_pairs(self.network, self.levels, self.layers, weight)
         fixing = Fixing(
             layers=self.layers,
             weight=weight,
-            toll=tolls.by_volume,
+            charge=charges.by_volume,
             after_contact=after,
             least=-np.inf,
         )
         return most, fixing
 
-    def _weight(self, multipliers: Floats, tolls: Tolls) -> Floats:
+    def _weight(self, multipliers: Floats, charges: ContactCharges) -> Floats:
         weight = np.empty((len(self.layers.first), len(self.rows)))
         passed = 0.0 if self.may_need_all else NEVER
-        earned = tolls.by_volume * self.terms.volume - tolls.antenna
+        earned = charges.by_volume * self.terms.volume - charges.antenna
         _weigh(
             self.terms,
             self.layers,
             multipliers[self.target],
-            tolls.by_volume,
+            charges.by_volume,
             earned,
             passed,
             weight,
         )
         return weight
 
-    def loads(self, path: Ints, layer: Ints, tolls: Tolls) -> Floats:
+    def loads(self, path: Ints, layer: Ints, charges: ContactCharges) -> Floats:
         """Return how much more data than it can take down a path gives to each contact.
 
         Parameters
@@ -241,7 +243,7 @@ class LatencyRelaxation:
         age_s = np.maximum(t.ready_s[None, :] - t.end_s[images, None], 0.0)
         gain = t.decaying[images, None] * np.exp2(-age_s / t.half_life_s)
         gain = np.minimum(gain, (t.most - t.on_board)[images, None])
-        gain -= tolls.by_volume[None, :] * t.size[images, None]
+        gain -= charges.by_volume[None, :] * t.size[images, None]
         may_follow = self.layers.contact[None, :] > images[:, None]
         may_follow &= np.arange(len(load))[None, :] >= self.layers.first[own, None]
         gain[~may_follow] = -np.inf
@@ -256,7 +258,7 @@ def _weigh(
     terms: _Terms,
     layers: Layers,
     multiplier: Floats,
-    tolls: Floats,
+    charges: Floats,
     earned: Floats,
     passed: float,
     weight: Floats,
@@ -265,7 +267,7 @@ def _weigh(
 
     Parameters
     ----------
-    tolls
+    charges
         What images pay to each contact, by volume. Shape ``(num_contacts,)``.
     earned
         What each contact earns if it is taken. Shape ``(num_contacts,)``.
@@ -279,7 +281,7 @@ def _weigh(
                     age_s = max(terms.ready_s[c] - terms.end_s[k], 0.0)
                     worth = terms.decaying[k] * 2.0 ** (-age_s / terms.half_life_s)
                     worth = min(worth, terms.most[k] - terms.on_board[k])
-                    gain[k] = max(gain[k], worth - tolls[c] * terms.size[k])
+                    gain[k] = max(gain[k], worth - charges[c] * terms.size[k])
         for k in range(m):
             worth = terms.on_board[k] + gain[k] - multiplier[k]
             weight[layer, k] = worth if worth > 0.0 else passed
@@ -368,10 +370,10 @@ class LatencyMultipliers(NamedTuple):
         return cls(
             targets=multiplier,
             by_volume=by_volume,
-            antenna=antenna_tolls(problem, antennas),
+            antenna=antenna_charges(problem, antennas),
             paid=float(multiplier.sum()) + paid_for_antennas(problem, antennas),
         )
 
-    def tolls_of(self, one: LatencyRelaxation) -> Tolls:
+    def tolls_of(self, one: LatencyRelaxation) -> ContactCharges:
         """Return the multipliers of a satellite's contacts."""
-        return Tolls(self.by_volume[one.contacts], self.antenna[one.contacts])
+        return ContactCharges(self.by_volume[one.contacts], self.antenna[one.contacts])

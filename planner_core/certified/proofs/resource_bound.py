@@ -22,7 +22,7 @@ from planner_core.certified.proofs.satellite_relaxation import SatelliteRelaxati
 from planner_core.certified.sizes import MAX_CELLS, MAX_STEPS
 from planner_core.certified.tolerances import ROUNDING
 from planner_core.certified.tuning import TUNING
-from planner_core.precedence.antennas import antenna_tolls, paid_for_antennas
+from planner_core.precedence.antennas import antenna_charges, paid_for_antennas
 from planner_core.problem import COLLECT, Bytes, Floats, Ints, Problem
 from planner_core.worth import common_unit, surplus, weights
 
@@ -42,9 +42,9 @@ def whole_worth(
     worth = weights(problem.worth[is_collect], multiplier)
     units[is_collect] = np.maximum(np.ceil(worth / unit - ROUNDING), 0.0)
     if antenna_multipliers is not None:
-        tolls = antenna_tolls(problem, antenna_multipliers)
+        charges = antenna_charges(problem, antenna_multipliers)
         most = int(units.sum(dtype=np.int64)) + 1
-        units[~is_collect] = -np.minimum(np.floor(tolls[~is_collect] / unit + ROUNDING), most)
+        units[~is_collect] = -np.minimum(np.floor(charges[~is_collect] / unit + ROUNDING), most)
     return units
 
 

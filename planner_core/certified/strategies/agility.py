@@ -1,7 +1,7 @@
 """Without resources: multipliers, window search, cutting planes, and HiGHS for what is left.
 
 Any multipliers of targets and cuts give, for each task, the most that a plan with that task can
-earn. Tasks that no better plan can hold are struck out (reduced-cost fixing), so that fewer and
+earn. Tasks that no better plan can hold are ruled out (reduced-cost fixing), so that fewer and
 fewer remain, for the search as well as for the proof.
 """
 
@@ -79,27 +79,29 @@ class AgilitySearch:
     def step(self, step: Multipliers) -> None:
         """Learn from multipliers: a bound, and the most that plans with each open task earn."""
         total, through = values_through(
-            self.problem, self._network, self._rows, step, ~self.is_struck
+            self.problem, self._network, self._rows, step, ~self.is_ruled_out
         )
         before = self._certified
-        # Plans with struck tasks are worth less than a better one.
+        # Plans with tasks that are ruled out are worth less than a better one.
         self.lower(max(total, self.refuted))
         by_row = np.empty(len(self._rows))
         by_row[self._network.row] = through
         lower = np.minimum(self.through, by_row)
         # Only steps that are kept may lower values: the proof replays those alone.
-        if self._certified < before or np.any(is_below(lower, self.best.better) > self.is_struck):
+        if self._certified < before or np.any(
+            is_below(lower, self.best.better) > self.is_ruled_out
+        ):
             self.steps.append(step)
             self.through = lower
 
     @property
-    def is_struck(self) -> np.ndarray:
+    def is_ruled_out(self) -> np.ndarray:
         """Which of the open tasks no better plan can hold."""
         return is_below(self.through, self.best.better)
 
     def shrink(self) -> None:
         """Remove the tasks that no better plan can hold."""
-        keep = ~self.is_struck
+        keep = ~self.is_ruled_out
         self._rows, self.through = self._rows[keep], self.through[keep]
         self._rest = restricted(self.problem, self._rows)
         self._network = network_of(self._rest)
@@ -177,7 +179,7 @@ class AgilitySearch:
                 self.round_off(master, taken)
             if self.best.is_done:
                 break
-            master.allow(~self.is_struck)
+            master.allow(~self.is_ruled_out)
             gap = max(bounds[-1] - self.best.better, 1e-9)
             # Until the relaxation is nearly as low as the subgradient's bound, zero-half cuts
             # mislead.

@@ -19,7 +19,7 @@ _WHY: Final[tuple[Why, ...]] = ("pin", "outage", "heading")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Struck:
+class RuledOut:
     """A collect that is ruled out.
 
     Attributes
@@ -42,7 +42,7 @@ class Struck:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StruckCollects(Mapping[int, tuple[Struck, ...]]):
+class RuledOutCollects(Mapping[int, tuple[RuledOut, ...]]):
     """All collects that are ruled out, by target; in columns, for a frozen half day has many.
 
     Attributes
@@ -65,13 +65,13 @@ class StruckCollects(Mapping[int, tuple[Struck, ...]]):
     kept: Ints
     first_kept: Longs
 
-    def __getitem__(self, target: int) -> tuple[Struck, ...]:
+    def __getitem__(self, target: int) -> tuple[RuledOut, ...]:
         """Return a target's ruled-out collects."""
         low, high = self.target.searchsorted([target, target + 1])
         if low == high:
             raise KeyError(target)
         return tuple(
-            Struck(
+            RuledOut(
                 row=int(self.row[i]),
                 satellite=int(self.satellite[i]),
                 start_s=float(self.start_s[i]),
@@ -90,7 +90,7 @@ class StruckCollects(Mapping[int, tuple[Struck, ...]]):
         """Return how many targets there are."""
         return len(np.unique(self.target))
 
-    def placed(self, place: Longs) -> StruckCollects:
+    def placed(self, place: Longs) -> RuledOutCollects:
         """Return the same collects in terms of another problem.
 
         Parameters
@@ -107,10 +107,10 @@ class StruckCollects(Mapping[int, tuple[Struck, ...]]):
         )
 
 
-def nothing_struck() -> StruckCollects:
+def nothing_ruled_out() -> RuledOutCollects:
     """Return an empty table: nothing is ruled out."""
     ints, floats = np.empty(0, dtype=np.int32), np.empty(0)
-    return StruckCollects(
+    return RuledOutCollects(
         target=ints, row=ints, satellite=ints, start_s=floats, end_s=floats,
         why=np.empty(0, dtype=np.int8), kept=ints, first_kept=np.zeros(1, dtype=np.int64),
     )  # fmt: skip
