@@ -1,7 +1,7 @@
-"""A second search for windows: every limit of every pair at every second, no cleverness.
+"""A second search for windows: checks every limit of every pair at every second, no shortcuts.
 
-Where some limit comes close to changing between two seconds and does not show it, hundredths
-of a second are looked at. Positions are Skyfield's.
+If a limit comes close to changing between two seconds without showing it, the search samples
+hundredths of a second there. Positions are Skyfield's.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tests.geometry import Ground, SkyfieldTable, vertical_at
 Floats = npt.NDArray[np.float64]
 Windows = list[tuple[float, float]]
 
-_NEAR_DEG = 1.5  # the fastest angle turns by about as much in a second
+_NEAR_DEG = 1.5  # about how far the fastest angle turns in a second
 _FINE_S = 0.01
 
 
@@ -93,7 +93,7 @@ class BruteForce:
 
 @dataclass
 class Comparison:
-    """What two lists of windows of the same pairs have and lack, and how far edges differ."""
+    """Which windows of the same pairs two lists lack or add, and by how much their edges differ."""
 
     missing: int = 0
     extra: int = 0
@@ -101,7 +101,7 @@ class Comparison:
     long_edge_errors_s: list[float] = field(default_factory=list)
 
     def add(self, found: Windows, expected: Windows, resolution_s: float = 0.02) -> None:
-        """Compare one pair's windows; those (and gaps) near the resolution may come or go."""
+        """Compare one pair's windows; ones (and gaps) near the resolution may be missing in one."""
         self.num_windows += len(expected)
         found, expected = _gaps_closed(found, resolution_s), _gaps_closed(expected, resolution_s)
         for start, end in expected:

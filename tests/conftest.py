@@ -18,18 +18,18 @@ from tests.service import prepared
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-# Before any test module is read: their counts of examples follow from it.
+# Before any test module is imported: the number of examples depends on it.
 load_profile()
 
-# Applications, servers and problems stay for a whole module: to look among them for garbage as
-# often as Python does takes a tenth of the time of the service's tests.
+# Applications, servers and problems stay alive for a whole module: collecting garbage as often as
+# Python does by default costs a tenth of the time of the service's tests.
 gc.set_threshold(20_000, 20, 20)
 
-# As in a worker, for this process's children: matrices are small, and threads that wait for the
-# next one spin.
+# As in a worker, for this process's children: matrices are small, and OpenBLAS threads spin while
+# they wait for the next one.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# What shares a service is done by one process.
+# Modules that share a service run in one process.
 _TOGETHER = {
     "tests/service/jobs/test_diff.py": "mission",
     "tests/service/jobs/test_explanation.py": "mission",
@@ -41,9 +41,9 @@ _TOGETHER = {
     "tests/service/client/test_resources.py": "client",
 }
 
-# What takes longest begins first, so that nobody waits for it in the end: all modules of more than
-# 6 s of processor time in the quick profile, by what they take with all that they start. Of what
-# shares a service one is named. The last waits for most of its time.
+# The longest modules begin first, so that nothing waits for them at the end: all modules of more
+# than 6 s of processor time in the quick profile, by what they use with all programs they start.
+# Of modules that share a service one is named. The last one mostly waits.
 _LONG = (
     "tests/planner_core/test_certified_delivered.py",
     "tests/service/test_readme.py",
@@ -75,7 +75,7 @@ _LONG = (
     "tests/service/webhooks/test_delivery.py",
 )
 
-# Of these the tests share nothing: they are handed out one by one.
+# Tests of these modules share nothing: they are handed out one by one.
 _APART = {
     "tests/planner_core/test_certified.py",
     "tests/planner_core/test_certified_delivered.py",
@@ -99,13 +99,13 @@ class _ByModule(LoadScopeScheduling):  # type: ignore[misc]  # it has no types
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Have one process from which all that run tests fork programs."""
+    """Start the one process from which all test processes fork their programs."""
     if sys.platform == "linux" and config.getoption("numprocesses", None):
         prepared.share()
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Return two for each core: many tests wait for programs that they have started."""
+    """Return two for each core: many tests wait for programs they started."""
     return 2 * (os.cpu_count() or 1)
 
 
@@ -117,13 +117,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _ByModule:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Import the tests, and all that they need, without looking for garbage in it."""
+    """Import the tests and all they need without collecting garbage."""
     with importing():
         return (yield)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put the long modules first, and beside a database server leave out what never asks it."""
+    """Put the long modules first; given a database server, deselect tests that do not use it."""
     place = {module: number for number, module in enumerate(_LONG)}
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
     if "SLEWLINE_TEST_SERVER_URL" in os.environ:
@@ -133,9 +133,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _asks_the_server(item: pytest.Item) -> bool:
-    """Return whether a test has a database on the server that is named, by a fixture or by itself.
+    """Return whether a test uses a database on the given server, by a fixture or by itself.
 
-    All others are the same without it, and `make test` runs them.
+    All other tests run the same way without it, and `make test` runs them.
     """
     assert isinstance(item, pytest.Function)
     return "template_url" in item.fixturenames or hasattr(item.module, "SERVER_URL")
@@ -143,7 +143,7 @@ def _asks_the_server(item: pytest.Item) -> bool:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Return the folder of real reference data, or skip where it is absent."""
+    """Return the folder of real reference data, or skip the test if it is absent."""
     place = Path(os.environ.get("SLEWLINE_TEST_DATA", _ROOT.parent / "shared" / "data"))
     if not place.is_dir():
         pytest.skip("the shared reference data is not on this machine")

@@ -1,4 +1,4 @@
-"""Orbits, points and a second, plain way to see from one to the other.
+"""Factories of orbits and ground points, and a second, plain computation of visibility.
 
 Everything below the factories is independent of the planner's own geometry: positions come
 from Skyfield, and limits are judged from vectors one instant at a time.
@@ -51,7 +51,7 @@ def orbit(
     mean_anomaly_deg: float = 0.0,
     bstar: float = 0.0,
 ) -> OrbitElements:
-    """Return the paper's own orbit unless told otherwise."""
+    """Return the given orbit; by default the paper's."""
     return OrbitElements(
         name="paper",
         norad_cat_id=1,
@@ -122,7 +122,7 @@ def _timescale() -> Timescale:
 
 @lru_cache(maxsize=4)
 def _times(start: datetime, after_s: bytes) -> Time:
-    """Return instants, which remember how the Earth stands then: that takes most of the time."""
+    """Return instants; cached, because they hold the Earth's orientation, the slowest part."""
     return _timescale().utc(
         start.year, start.month, start.day, start.hour, start.minute,
         start.second + np.frombuffer(after_s),

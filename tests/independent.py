@@ -1,7 +1,7 @@
 """A second opinion on a timeline, from the scenario file and the answer alone.
 
-Nothing of the planner is imported: orbits come from python-sgp4 directly, geometry and
-resources are worked out again in the plainest way, from the documents that a client sees.
+It imports nothing of the planner: orbits come from python-sgp4 directly, and geometry and
+resources are computed again in the plainest way, from the documents that a client sees.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Document = dict[str, Any]
 
 A_KM, FLATTENING = 6378.137, 1 / 298.257223563
 ANGLE_TOLERANCE_DEG = 0.02
-"""Earth orientation (up to 0.2 s of UT1) is left out here: about 0.01 deg seen from orbit."""
+"""Earth orientation (up to 0.2 s of UT1) is ignored here: about 0.01 deg as seen from orbit."""
 
 
 def instant(text: str) -> datetime:
@@ -31,7 +31,7 @@ def instant(text: str) -> datetime:
 
 
 def record_of(satellite: Document) -> Satrec:
-    """Return python-sgp4's own record of an orbit as the client gave it, always the same one."""
+    """Return python-sgp4's record of an orbit as the client gave it; the same one on each call."""
     if satellite.get("tle"):
         return _of_tle(*satellite["tle"])
     return _of_omm(tuple((key, str(value)) for key, value in satellite["omm"].items()))
@@ -75,7 +75,7 @@ def to_earth(r: Vector, when: datetime) -> Vector:
 
 
 def place_km(place: Document) -> tuple[Vector, Vector]:
-    """Return the Earth-fixed position and the local up direction."""
+    """Return the site's Earth-fixed position and local up direction."""
     return _place_km(*_coordinates(place))
 
 
@@ -112,11 +112,11 @@ def angle_deg(u: Vector, v: Vector) -> float:
 
 
 def view(record: Satrec, place: Document, when: datetime) -> tuple[float, float]:
-    """Return off-nadir angle at the satellite (geodetic) and elevation at the place."""
+    """Return the off-nadir angle at the satellite (geodetic) and the elevation at the site."""
     return _view(record, _coordinates(place), when)
 
 
-@lru_cache(2**17)  # solvers take the same tasks of a mission, and each is looked at every second
+@lru_cache(2**17)  # solvers choose the same tasks of a mission, each checked at every second
 def _view(
     record: Satrec, coordinates: tuple[float, float, float], when: datetime
 ) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def _view(
 
 
 def line_of_sight(record: Satrec, place: Document, when: datetime) -> Vector:
-    """Return the inertial direction from the satellite to the place."""
+    """Return the inertial direction from the satellite to the site."""
     p, _ = place_km(place)
     angle = earth_angle_rad(when)
     c, s = math.cos(angle), math.sin(angle)
@@ -135,7 +135,7 @@ def line_of_sight(record: Satrec, place: Document, when: datetime) -> Vector:
 
 
 def check(scenario: Document, timeline: Document, targets: list[Document]) -> None:
-    """Assert that a valid timeline really keeps the rules, and adds up."""
+    """Assert that a valid timeline obeys the rules and its figures add up."""
     assert timeline["validity"] == "valid"
     places = {t["id"]: t for t in scenario["targets"]} | {
         ("station", g["id"]): g for g in scenario["ground_stations"]
@@ -179,7 +179,7 @@ def _curve(scenario: Document) -> list[list[float]]:
 
 
 def _steepest(scenario: Document) -> float:
-    """Return the most that quality changes in a degree."""
+    """Return the largest change of quality per degree."""
     knots = itertools.pairwise(_curve(scenario))
     return max((abs(v - u) / (b - a) for (a, u), (b, v) in knots), default=0.0)
 
@@ -200,7 +200,7 @@ def _quality(
 def _check_geometry(
     record: Satrec, satellite: Document, places: dict[Any, Document], action: Document
 ) -> None:
-    """Every second of a task lies within the limits of sensor or mask."""
+    """Assert that every second of a task lies within the limits of sensor or mask."""
     place = _place_of(places, action)
     sensor = satellite.get("sensor") or {}
     for when in _seconds(action):
@@ -265,7 +265,7 @@ def _rates(satellite: Document) -> dict[str, float]:
 
 
 def _check_resources(satellite: Document, timeline: Document, line: Document) -> None:
-    """Walk from task to task; in between the satellite points at the sun."""
+    """Check the levels task by task; in between the satellite points at the sun."""
     rates = _rates(satellite)
     battery, recorder, lowest, highest = 1.0, 0.0, 1.0, 0.0
     now = instant(timeline["horizon"]["start"])

@@ -32,7 +32,7 @@ PAPER_ORBIT: Document = {
     "MEAN_MOTION_DOT": 0.0,
     "MEAN_MOTION_DDOT": 0.0,
 }
-"""The satellite of the paper: its authors' elements."""
+"""The paper's satellite, with its authors' orbital elements."""
 
 STATIONS: list[Document] = [
     {"name": "Svalbard", "lat_deg": 78.2298391, "lon_deg": 15.3924483, "min_elevation_deg": 5.0},

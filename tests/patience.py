@@ -1,7 +1,7 @@
-"""How long tests wait for what must come.
+"""How long tests wait for an event that must occur.
 
-Whoever waits asks again and again, and goes on at once when it has come. So this costs time
-only where something is broken, and is far beyond what anything takes on a busy machine.
+Waiting polls the condition and ends as soon as it holds. So the limit costs time only if something
+is broken; it is far beyond what anything takes on a busy machine.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def wait_until(condition: Callable[[], object], what: object = "it never happene
     Parameters
     ----------
     what
-        What is said where it does not; if it can be called, what it returns.
+        The failure message, or a function that returns it.
     """
     deadline_s = time.monotonic() + PATIENCE_S
     while not condition():
@@ -30,5 +30,5 @@ def wait_until(condition: Callable[[], object], what: object = "it never happene
 
 
 def wait_for_the_end_of(pid: int) -> None:
-    """Return when there is no such process; who has ended may not be collected at once."""
+    """Return when the process no longer exists; one that has ended may be reaped late."""
     wait_until(lambda: not psutil.pid_exists(pid), f"process {pid} has not ended")

@@ -1,7 +1,7 @@
-"""Calls over plain HTTP, as all are that stay on this machine.
+"""Calls over plain HTTP, as used for everything on this machine.
 
-A client of ``httpx`` is ready for TLS: it reads the certificates of all authorities for 20 ms of
-processor time, and a call outside a client makes one of its own. Give such calls
+A client of ``httpx`` prepares for TLS by reading the certificates of all authorities, which takes
+20 ms of processor time, and each call outside a client creates its own client. Give such calls
 ``verify=NO_TLS``.
 """
 

@@ -1,4 +1,4 @@
-"""What the pages about the code name is there."""
+"""The modules and folders that pages and docstrings name exist, and the index is complete."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 _ROOT = Path(__file__).resolve().parents[1]
 _CORE = _ROOT / "planner_core"
-# Pages say where in the core something is; inside ``certified`` they leave that out.
+# Pages give locations relative to the core, to ``certified`` or to its neighbourhood search.
 _FOLDERS = (_ROOT, _CORE, _CORE / "certified", _CORE / "certified" / "lns")
 
 
@@ -40,7 +40,7 @@ def test_every_module_that_docstrings_and_comments_name_exists() -> None:
 
 
 def _is_there(parts: list[str]) -> bool:
-    """Return whether that is a folder, a module, or a name in one."""
+    """Return whether the name is a folder, a module, or defined in one."""
     whole, owner = _ROOT.joinpath(*parts), _ROOT.joinpath(*parts[:-1])
     if whole.is_dir() or whole.with_suffix(".py").is_file():
         return True

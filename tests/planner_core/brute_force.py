@@ -1,4 +1,4 @@
-"""The best plan of a small problem, by trying every one; nothing is shared with the solvers."""
+"""The best plan of a small problem, by trying all; shares no code with the solvers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Rows = tuple[int, ...]
 
 
 def best_reward(problem: Problem) -> float:
-    """Return the highest reward of any valid plan, judged by the referee; 0 where none is."""
+    """Return the highest reward of any valid plan, judged by the referee; 0 if there is none."""
     best = best_plan(problem)
     return 0.0 if best is None else replay(problem, best, in_detail=False).reward
 
@@ -28,11 +28,11 @@ def best_reward(problem: Problem) -> float:
 def best_plan(problem: Problem) -> Plan | None:
     """Return a valid plan of the highest reward, judged by the referee, if there is any.
 
-    Plans with a turn that takes too long are left out, and such as break a pin. The others are
-    judged from the one that could earn most downwards, until no other can earn more.
+    Plans with an infeasible slew or a broken pin are skipped. The others are judged in descending
+    order of what they could earn, until no remaining one can earn more.
     """
     most, alone, refused = _Most(problem), _Alone(problem), _Refused(problem)
-    # Of those that could earn the same the longest first: it has contacts for what it takes.
+    # Among equals the longest first: it includes the contacts that its images need.
     plans = sorted(
         ((most.of(rows), len(rows), rows) for rows in possible_plans(problem)), reverse=True
     )
@@ -59,7 +59,7 @@ def has_plan(problem: Problem) -> bool:
 
 
 def possible_plans(problem: Problem) -> Iterator[Rows]:
-    """Yield the tasks of each plan in which every turn fits and every pin is kept."""
+    """Yield the tasks of each plan in which every slew fits and every pin is kept."""
     kept = set(problem.kept_rows.tolist())
     for rows in _chains(problem, _not_ruled_out(problem), _may_follow(problem)):
         if not kept or kept.issubset(rows):
@@ -67,14 +67,14 @@ def possible_plans(problem: Problem) -> Iterator[Rows]:
 
 
 class _Most:
-    """What a plan could earn at most: each image comes down as soon as a contact begins."""
+    """An upper bound on a plan's reward: each image is downlinked as soon as a contact begins."""
 
     def __init__(self, problem: Problem) -> None:
         table = problem.opportunities
         self._is_image: list[bool] = (table.kind == COLLECT).tolist()
         self._site: list[int] = table.site.tolist()
         self._satellite: list[int] = table.satellite.tolist()
-        # Of each image before each contact; last, of one that no contact follows.
+        # Age of each image at each contact; last column: no contact follows.
         age_s = np.maximum(table.start_s[None, :] - table.end_s[:, None], 0.0)
         age_s = np.column_stack([age_s, np.full(len(table), np.inf)])
         if problem.counts_delivery:
@@ -85,7 +85,7 @@ class _Most:
         self.on_board = sum(i.worth for i in problem.on_board if problem.counts_delivery)
 
     def of(self, rows: Rows) -> float:
-        """Return the most that tasks could earn that follow each other in this order."""
+        """Return an upper bound on what tasks in this order earn."""
         best: dict[int, float] = {}
         contact: dict[int, int] = {}
         for row in reversed(rows):
@@ -99,10 +99,10 @@ class _Most:
 
 
 class _Refused:
-    """Tasks with which no satellite may begin, since its battery or recorder breaks a limit there.
+    """Sequences with which no satellite may begin, since battery or recorder breaks a limit there.
 
-    A level after a task follows from that task and those before it. So a plan is lost with the
-    first task that is to blame, whatever follows.
+    A level after a task depends only on that task and those before it. So a plan in which
+    a satellite begins like that is invalid, whatever follows.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -110,7 +110,7 @@ class _Refused:
         self._beginnings: set[Rows] = set()
 
     def has(self, rows: Rows) -> bool:
-        """Return whether a satellite begins as it may not."""
+        """Return whether some satellite's tasks begin with a refused sequence."""
         own: dict[int, Rows] = {}
         if self._beginnings:
             for row in rows:
@@ -121,7 +121,7 @@ class _Refused:
         return False
 
     def learn(self, rows: Rows, timeline: Timeline) -> None:
-        """Note what the referee says of a plan."""
+        """Record the limits that the referee reports as broken."""
         for violation in timeline.violations:
             if violation.code in ("battery", "recorder") and violation.blamed:
                 begun = rows[: min(violation.blamed) + 1]
@@ -130,9 +130,9 @@ class _Refused:
 
 
 class _Alone:
-    """What plans could earn by what the referee says of each satellite's part alone.
+    """An upper bound on a plan's reward, from the referee's verdict on each satellite's part alone.
 
-    Turns, battery and recorder are of one satellite, and many plans of a fleet have the same part.
+    Slews, battery and recorder concern one satellite, and many plans of a fleet share a part.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -141,7 +141,7 @@ class _Alone:
         self._known: dict[Rows, dict[int, float] | None] = {}
 
     def most(self, rows: Rows) -> float:
-        """Return the most that a plan could earn, nothing where a part of it is not valid."""
+        """Return an upper bound on the plan's reward; zero if a part of it is invalid."""
         parts: dict[int, list[int]] = {}
         for row in rows:
             parts.setdefault(self._satellite[row], []).append(row)
@@ -165,7 +165,7 @@ class _Alone:
 
 
 def _not_ruled_out(problem: Problem) -> list[int]:
-    """Return the tasks that no pin rules out, as the referee sees it."""
+    """Return the tasks that no pin rules out, judged by the referee."""
     everything = Plan.of(problem, range(len(problem.opportunities)))
     ruled_out = {
         everything.actions[position].opportunity
@@ -176,7 +176,7 @@ def _not_ruled_out(problem: Problem) -> list[int]:
 
 
 def _may_follow(problem: Problem) -> set[tuple[int, int]]:
-    """Return which two tasks a satellite has time to turn between, as the referee sees it."""
+    """Return the pairs of tasks between which a satellite has time to slew, by the referee."""
     table = problem.opportunities
     pairs: set[tuple[int, int]] = set()
     for index in range(len(problem.satellites)):
@@ -193,7 +193,7 @@ def _may_follow(problem: Problem) -> set[tuple[int, int]]:
 
 
 def _chains(problem: Problem, rows: list[int], may_follow: set[tuple[int, int]]) -> list[Rows]:
-    """Return all plans of some rows in which each row comes after one that it may follow."""
+    """Return all plans of these rows in which each row follows one that it may follow."""
     satellite: list[int] = problem.opportunities.satellite.tolist()
     # Each with the last task of each satellite, if there is any.
     nothing: tuple[int | None, ...] = (None,) * len(problem.satellites)

@@ -1,4 +1,4 @@
-"""Budgets that end with what a search has done: on a slow machine as on a fast one."""
+"""Budgets that end after a certain amount of work: the same on slow and fast machines."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from planner_core.budget import Budget, Progress
 
 
 def expiring(is_enough: Callable[[Progress], bool]) -> Budget:
-    """Return a budget whose time is over with the first report that is enough."""
+    """Return a budget whose time is over with the first report that satisfies the condition."""
     budget = Budget()
 
     def look_at(progress: Progress) -> None:
@@ -21,7 +21,7 @@ def expiring(is_enough: Callable[[Progress], bool]) -> Budget:
 
 
 def bounds_told(number: int) -> Callable[[Progress], bool]:
-    """Return what says when so many different bounds have been told."""
+    """Return a condition that holds once this number of different bounds has been reported."""
     told: set[float] = set()
 
     def look_at(progress: Progress) -> bool:
@@ -33,7 +33,7 @@ def bounds_told(number: int) -> Callable[[Progress], bool]:
 
 
 def reports(number: int) -> Callable[[Progress], bool]:
-    """Return what says when so many reports have come."""
+    """Return a condition that holds once this number of reports has come."""
     told = count(1)
     return lambda _: next(told) >= number
 

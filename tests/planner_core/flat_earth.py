@@ -1,4 +1,4 @@
-"""Small problems with continuous starts: satellites that swing to and fro over a plane."""
+"""Small problems with continuous starts: satellites that oscillate above a plane."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def flat_problem(
 ) -> Problem:
     """Return a crowded problem drawn from ``seed``, with true lines of sight.
 
-    Without a spacing each access offers its middle alone.
+    Without a spacing each access offers one collect, at its middle.
     """
     rng = np.random.default_rng(seed)
     targets_m = np.column_stack(
@@ -106,7 +106,7 @@ def _accesses(path: Path, target_m: Floats, horizon_s: float) -> list[tuple[floa
 
 
 def _seen(problem: Problem, pointing: Pointing, accesses: list[tuple[float, float]]) -> Problem:
-    """Return the problem with the lines of sight and the accesses that it really has."""
+    """Return the problem with the lines of sight and the accesses that its paths give."""
     table = problem.opportunities
     n = len(table)
     is_collect = table.kind == COLLECT
@@ -119,5 +119,5 @@ def _seen(problem: Problem, pointing: Pointing, accesses: list[tuple[float, floa
     for row in np.flatnonzero(is_collect):
         table.access_start_s[row], table.access_end_s[row] = accesses[number[row]]
     continuous = replace(problem, continuous_starts=True, pointing=pointing)
-    # What may follow what is worked out anew from the true lines of sight.
+    # Transitions are recomputed from the true lines of sight.
     return replace(restricted(continuous, np.arange(n, dtype=np.int32)), origin=None)

@@ -1,4 +1,4 @@
-"""Small generated problems: geometry is drawn at random, the rest is the real thing."""
+"""Small generated problems: the geometry is drawn at random, everything else is real."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ TIGHT = Resources(
     downlink_per_s=1 / 250,
     telemetry_per_s=1e-4,
 )
-"""Resources that bind within a handful of tasks."""
+"""Resources so scarce that they bind within a handful of tasks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +151,7 @@ def make_problem(
 
 
 def with_rewards(problem: Problem, rewards: Sequence[float] | npt.NDArray[np.number]) -> Problem:
-    """Return the problem with other rewards of its targets, which all their collects earn."""
+    """Return the problem with other target rewards, which all collects of a target earn."""
     reward, n = np.array(rewards, dtype=np.float64), len(problem.opportunities)
     return replace(problem, worth=_worth(problem.opportunities, reward, np.ones(n)))
 
@@ -185,9 +185,9 @@ def random_problem(
 ) -> Problem:
     """Return a small crowded problem drawn from ``seed``.
 
-    Each access offers ``num_offers`` collects, 9 s apart.
-    With ``max_turn_deg`` lines of sight turn during collects, by up to that either way. With
-    ``has_quality`` each collect has its own, some of them none at all.
+    Each access offers ``num_offers`` collects, 9 s apart. With ``max_turn_deg`` lines of sight
+    turn during collects, by up to that either way. With ``has_quality`` each collect has a
+    quality of its own, sometimes 0.
     """
     rng = np.random.default_rng(seed)
     tasks: list[Task] = []
@@ -253,7 +253,7 @@ def varied_problem(
     num_contacts: int = 2,
     has_quality: bool = False,
 ) -> Problem:
-    """Return a problem with resources: rewards or none, eclipses or none, tight or scarce ones."""
+    """Return a problem with resources; rewards, eclipses and scarcity vary with the seed."""
     rng = np.random.default_rng(seed)
     return random_problem(
         seed,
@@ -280,11 +280,11 @@ def sunny_problem(
     is_moving: bool = False,
     use_resources: bool = True,
 ) -> Problem:
-    """Return a problem with turns to the sun, and power drawn at all times in two of three.
+    """Return a problem with turns to the sun; two of three draw power at all times.
 
-    The sun stands in the plane of the lines of sight or above it, 60 to 250 s of turn away with
-    most agilities; batteries allow for a few images between visits. With ``is_plain`` all
-    images are worth the same; with ``is_moving`` turns begin and end in motion.
+    The sun stands in the plane of the lines of sight or above it, 60 to 250 s of slewing away for
+    most agilities; batteries allow a few images between visits. With ``is_plain`` all images
+    are worth the same; with ``is_moving`` slews begin and end in motion.
     """
     rng = np.random.default_rng(seed)
     angle, height = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.5, 0.5)

@@ -1,4 +1,4 @@
-"""Accesses: limits hold inside every window and fail outside it; none is missed."""
+"""Accesses: limits hold inside every window and fail outside it; no window is missed."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def within_limits(position: Floats, ground: Ground, sensor: Sensor) -> Bools:
 
 @pytest.mark.parametrize("nadir", ["geodetic", "geocentric"])
 def test_limits_hold_half_a_second_inside_and_fail_half_a_second_outside(nadir: Nadir) -> None:
-    """Judged from Skyfield positions, at both edges of every window."""
+    """Checked with Skyfield positions, at both edges of every window."""
     sensor = Sensor(nadir=nadir)
     targets = some_targets(60)
     found = accesses_of(targets, sensor)
@@ -119,7 +119,7 @@ def test_no_window_is_missed_and_none_invented(
     elevation: float,
     nadir: Nadir,
 ) -> None:
-    """Against a scan every second of the planner's own path, for generated orbits and limits."""
+    """Against a scan of the planner's own path at every second, for random orbits and limits."""
     sensor = Sensor(
         off_nadir_min_deg=lowest,
         off_nadir_max_deg=min(90.0, lowest + width),
@@ -143,7 +143,7 @@ def test_no_window_is_missed_and_none_invented(
         )
         if window[1] - window[0] > 0.002
     ]
-    # The scan may step over a window or a gap of less than a second: look for its windows.
+    # The scan may step over a window or gap shorter than a second: look for the scan's windows.
     for start, end in expected:
         inside = (found.end_s > start) & (found.start_s < end)
         assert abs(found.start_s[inside].min() - start) < 0.002
@@ -155,7 +155,7 @@ def test_no_window_is_missed_and_none_invented(
 
 
 def test_grazing_passes_shorter_than_the_step_between_nodes_are_found() -> None:
-    """A pass's top elevation, less a little, as the minimum leaves a window of seconds."""
+    """A minimum elevation just below a pass's maximum leaves a window of seconds."""
     path = propagate(satellite(), hours(24))
     station = GroundStation(id="s", name="s", lat_deg=40.0, lon_deg=10.0, min_elevation_deg=0.0)
     site = Sites.of([station])
@@ -285,7 +285,7 @@ MASKS = [
 def test_contacts_stand_above_the_azimuth_elevation_mask(
     mask: tuple[tuple[float, float], ...],
 ) -> None:
-    """The same windows as a scan every tenth of a second along each pass."""
+    """Compared with a scan of each pass every tenth of a second."""
     path = propagate(satellite(), hours(24))
     station = GroundStation(
         id="s", name="s", lat_deg=78.2, lon_deg=15.4, min_elevation_deg=7.0, elevation_mask=mask

@@ -1,4 +1,4 @@
-"""A(s): what a state offers is what the definition says, however quickly it is looked for."""
+"""A(s): the feasible actions match their definition, however fast they are found."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_what_may_follow_a_task_is_the_same_when_it_is_remembered(
     remembered = step_for(track, rules, GUIDANCE, problem.worth[satellite.rows], nothing, 0)
     successors = remembered.successors
     for _ in range(40):
-        # The plan takes a target now and then, and a simulation some more of them.
+        # The plan takes targets now and then; a simulation takes some more of them.
         successors.imaged[rng.integers(len(successors.imaged))] = 1
         collected = successors.imaged | (rng.random(len(successors.imaged)) < 0.3)
         last = int(rng.integers(-1, m // 2))
@@ -184,7 +184,7 @@ CONTACT_SOLVERS: list[Solver] = [
 
 @pytest.mark.parametrize("solver", CONTACT_SOLVERS, ids=lambda s: s.name)
 def test_a_contact_passes_while_the_recorder_has_room_until_the_next(solver: Solver) -> None:
-    """The first contact stands in an image's way; there is a second one in good time."""
+    """The first contact conflicts with an image; the second one comes early enough."""
     tasks = [
         Task(kind=CONTACT, site=0, start_s=90.0, end_s=150.0),
         Task(kind=COLLECT, site=0, start_s=100.0, end_s=130.0),
@@ -199,7 +199,7 @@ def test_a_contact_passes_while_the_recorder_has_room_until_the_next(solver: Sol
 
 @pytest.mark.parametrize("solver", CONTACT_SOLVERS, ids=lambda s: s.name)
 def test_the_last_contact_before_many_images_is_taken(solver: Solver) -> None:
-    """Without it the recorder, a fifth full, has room for two of them: 15 % each, 50 % at most."""
+    """Without it the recorder holds only two of the three: 20 % full, 15 % each, limit 50 %."""
     strong = replace(
         TIGHT, initial_recorder_fraction=0.2, collect_drain_per_s=1e-6, telemetry_per_s=0.0
     )
@@ -212,6 +212,6 @@ def test_the_last_contact_before_many_images_is_taken(solver: Solver) -> None:
     solver = replace(solver, contact_above_fraction=0.45)  # type: ignore[type-var]
     plan = solver.solve(problem, Budget(), 0).plan
     assert replay(problem, plan).reward == 3.0
-    # A single image leaves no reason to take it.
+    # For a single image the contact is not needed.
     fewer = make_problem([contact, *images[:1]], num_targets=1, resources=strong)
     assert len(solver.solve(fewer, Budget(), 0).plan.actions) == 1

@@ -1,4 +1,4 @@
-"""Multipliers of antennas that satellites want at the same time: bounds hold, and know of them."""
+"""Multipliers of antennas that several satellites want at once: bounds hold and get tighter."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def test_a_contact_pays_for_no_more_than_was_recorded_before_it() -> None:
 
 
 def test_images_of_a_satellite_with_an_antenna_of_its_own_pay_nothing() -> None:
-    """The third passes later. What it takes after that stays on board."""
+    """The third satellite passes later; its image of the same target after that stays on board."""
     tasks = [
         Task(kind=CONTACT, site=0, satellite=s, start_s=at_s, end_s=at_s + 100.0)
         for s, at_s in enumerate((800.0, 800.0, 1200.0))
@@ -231,7 +231,7 @@ def test_more_levels_of_the_recorder_lower_the_bound_of_the_same_multipliers() -
 
 
 def test_multipliers_of_antennas_that_prove_nothing_are_given_up() -> None:
-    """The bound of the multipliers that a search ends with is no higher than at first."""
+    """The final bound is no higher than without those multipliers."""
     num_crowded = 0
     for seed in range(12):
         problem = _crowded_fleet(seed)
@@ -267,7 +267,7 @@ def test_with_two_antennas_nothing_is_crowded() -> None:
 
 
 def test_a_path_pays_for_its_contacts() -> None:
-    """Three whole units for two images, less one for the contact that brings them down."""
+    """Three whole units for two images, less one for the contact that downlinks them."""
     problem = shared_pass()
     multipliers, antenna = np.full(4, 0.5), np.array([0.25])
     worth = whole_worth(problem, multipliers, 0.25, antenna)

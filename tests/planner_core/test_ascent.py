@@ -1,4 +1,4 @@
-"""The ascent: whatever the multipliers are they bound all plans, and they settle near the best."""
+"""The ascent: any multipliers bound all plans, and the ascent ends close to the best ones."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GO_ON = np.zeros(1, dtype=np.uint8)
 
 
 def crowded(seed: int, num_satellites: int) -> Problem:
-    """Return a fleet that wants more of the same targets than it can take."""
+    """Return a fleet that competes for targets."""
     return random_problem(
         seed, use_resources=False, num_collects=60 * num_satellites, num_targets=30,
         num_satellites=num_satellites, has_rewards=seed % 2 == 0, max_turn_deg=25.0,
@@ -34,14 +34,14 @@ def crowded(seed: int, num_satellites: int) -> Problem:
 
 
 def settled(problem: Problem, num_epochs: int) -> tuple[float, Floats]:
-    """Return what so many epochs prove, and the multipliers."""
+    """Return the bound after this number of epochs, and the multipliers."""
     ascent = ascent_on_paths(problem, network_of(problem), num_epochs, 0)
     ascent.run(0.0, GO_ON)
     return ascent.value, ascent.multipliers
 
 
 def best_known(problem: Problem) -> float:
-    """Return what many plain subgradient steps prove, each of all satellites at once."""
+    """Return the best bound of many plain subgradient steps, each over all satellites at once."""
     most = problem.best_worth
     now, best = 0.5 * most, np.inf
     for number in range(1, 2001):
@@ -76,7 +76,7 @@ def test_no_plan_of_a_fleet_beats_them(
 
 
 class PlainPaths(OneByOne):
-    """What ``Paths`` does, an answer at a time."""
+    """Same as ``Paths``, one answer at a time."""
 
     def __init__(self, problem: Problem) -> None:
         self._network = network_of(problem)

@@ -1,4 +1,4 @@
-"""Where a satellite looks at the start: the first turns, the first visit to the sun, proofs."""
+"""The attitude at the start: first slews, the first visit to the sun, proofs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ SEEDS = st.integers(0, 10**6)
 
 
 def _headed(seed: int, *, is_moving: bool = False, is_cut: bool = True) -> Problem:
-    """Return a drawn problem of two satellites that look somewhere at the start."""
+    """Return a drawn problem of two satellites with a given attitude at the start."""
     rng = np.random.default_rng(seed)
     kind = int(rng.integers(3))
     if kind == 0:
@@ -81,7 +81,7 @@ def _headed(seed: int, *, is_moving: bool = False, is_cut: bool = True) -> Probl
 @examples(60)
 @given(seed=SEEDS)
 def test_no_plan_begins_too_soon_and_the_bound_is_never_below_the_best(seed: int) -> None:
-    """The best of all opportunities, by the referee; planned is with those that are left."""
+    """The referee's best of all opportunities bounds planning with the remaining ones."""
     whole = _headed(seed)
     best = best_plan(whole)
     if best is None:
@@ -105,7 +105,7 @@ def test_every_solver_turns_from_where_it_looks(seed: int, *, is_moving: bool) -
 @examples(100)
 @given(seed=SEEDS, is_moving=st.booleans())
 def test_the_referee_finds_the_first_visit_to_the_sun_itself(seed: int, *, is_moving: bool) -> None:
-    """Without the sunlight that problems leave out before it."""
+    """Even if the problem keeps the sunlight before that visit, which it normally leaves out."""
     cut, plain = (_headed(seed, is_moving=is_moving, is_cut=is_cut) for is_cut in (True, False))
     rng = np.random.default_rng(seed)
     rows = [row for row in range(len(cut.opportunities)) if rng.random() < 0.3]
@@ -120,7 +120,7 @@ def test_the_referee_finds_the_first_visit_to_the_sun_itself(seed: int, *, is_mo
 
 
 def _rotated(problem: Problem, axes: Floats) -> Problem:
-    """Return a problem whose lines of sight, their motion and the sun are seen in other axes."""
+    """Return the problem with lines of sight, their rates and the sun in rotated axes."""
     table, columns = (
         problem.opportunities,
         ("los_start", "los_end", "los_rate_start", "los_rate_end"),
@@ -144,7 +144,7 @@ def _rotated(problem: Problem, axes: Floats) -> Problem:
 @examples(50)
 @given(seed=SEEDS)
 def test_turns_take_as_long_in_whatever_axes_they_are_told(seed: int) -> None:
-    """In small problems all lies in one plane: here no axis is left out."""
+    """Small problems lie in one plane; here every axis matters."""
     axes, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     whole = _headed(seed, is_moving=True)
     other = _rotated(whole, axes * np.linalg.det(axes))
@@ -170,7 +170,7 @@ def test_a_turn_takes_no_longer_where_there_is_more_time_for_it(seed: int) -> No
 
 
 def test_the_turn_takes_what_it_takes() -> None:
-    """60 deg at 1 deg/s, 5 s to settle: a task may begin at 65 s, and none sooner."""
+    """60 deg at 1 deg/s and 5 s to settle: no task may begin before 65 s."""
     look = (float(np.cos(np.pi / 3.0)), float(np.sin(np.pi / 3.0)), 0.0)
     for start_s, is_fine in ((65.0, True), (64.99, False)):
         problem = make_problem(
@@ -201,7 +201,7 @@ def test_the_turn_takes_what_it_takes() -> None:
 
 
 _RATE_DEG_S = 0.1
-"""So slow that half an hour shows where it began."""
+"""So slow that the initial attitude still matters after half an hour."""
 
 
 def _mission(horizon: Horizon, *states: State, **more: Any) -> Scenario:
@@ -237,7 +237,7 @@ def _independent_look(when: datetime, site: dict[str, float]) -> np.ndarray:
 
 @pytest.mark.parametrize("before_s", [0.0, 400.0])
 def test_what_is_tracked_is_found_as_others_find_it(before_s: float) -> None:
-    """Lines of sight by python-sgp4 alone: what is left is what a slow turn reaches."""
+    """Lines of sight by python-sgp4: exactly the tasks within reach of a slow slew remain."""
     begin = hours(1).start
     horizon = Horizon(start=begin + timedelta(seconds=before_s), end=begin + timedelta(hours=1))
     own, plain = satellite(orbit()).id, _mission(horizon)
@@ -246,7 +246,7 @@ def test_what_is_tracked_is_found_as_others_find_it(before_s: float) -> None:
     seen = _independent_look(begin, station)
     angle_deg = np.degrees(np.arccos(np.clip(table.los_start @ seen, -1.0, 1.0)))
     room_s = table.start_s + before_s - angle_deg / _RATE_DEG_S
-    clear = np.abs(room_s) > 1.0  # a hundredth of a degree takes a tenth of a second
+    clear = np.abs(room_s) > 1.0  # an error of 0.01 deg is worth a tenth of a second
     row = int(np.flatnonzero(table.kind == 1)[0])
     site = ("sv", "tr")[int(table.site[row])]
     attitudes = [
@@ -266,7 +266,7 @@ def test_what_is_tracked_is_found_as_others_find_it(before_s: float) -> None:
 
 
 def test_after_a_long_wait_it_is_at_the_sun() -> None:
-    """Where charging needs turns: the first task needs the one back, whatever it looked at."""
+    """If charging needs slews: the first task needs the slew back, whatever the attitude was."""
     begin = hours(1).start
     horizon = Horizon(start=begin + timedelta(hours=2), end=begin + timedelta(hours=3))
     own = satellite(orbit()).id
@@ -288,7 +288,7 @@ def test_after_a_long_wait_it_is_at_the_sun() -> None:
 
 
 def test_accesses_open_once_they_can_be_turned_to() -> None:
-    """With continuous starts: no start before, and the first one is offered."""
+    """With continuous starts: no earlier start is allowed, and the earliest one is offered."""
     begin = hours(1).start
     horizon = Horizon(start=begin, end=begin + timedelta(hours=1))
     own = satellite(orbit()).id

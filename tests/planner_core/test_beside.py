@@ -1,4 +1,4 @@
-"""What cannot stand beside kept actions, held against its definition pair by pair."""
+"""What cannot run beside kept actions, compared with its definition pair by pair."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.planner_core.problems import random_problem
 
 
 def excludes(problem: Problem, row: int, other: int, kept: list[int]) -> bool:
-    """Return whether ``other`` cannot stand beside ``row`` where all of ``kept`` runs."""
+    """Return whether ``other`` cannot run beside ``row`` if all of ``kept`` runs."""
     table = problem.opportunities
     if table.kind[row] == table.kind[other] == COLLECT and table.site[row] == table.site[other]:
         return True

@@ -1,4 +1,4 @@
-"""The bound holds for every plan, whatever the multipliers."""
+"""The bound holds for every plan, with any multipliers."""
 
 from __future__ import annotations
 
@@ -120,21 +120,21 @@ _FILLED = {"initial_recorder_fraction": 0.125}
 @pytest.mark.parametrize(
     ("changes", "contacts", "sun_s", "images"),
     [
-        # 0.3 of the battery for 0.1 an image; contacts only cost energy.
+        # 0.3 of the battery at 0.1 per image; contacts only cost energy.
         (_CHARGED, [], 1000.0, 3.0),
         (_CHARGED, [_pass(0.0, 900.0, 0)], 1000.0, 3.0),
         ({"collect_drain_per_s": 0.0}, [], 1000.0, 20.0),
         ({"initial_battery_fraction": 0.2}, [], 1000.0, 0.0),
-        # The sun gives 0.2 more, if it shines for 240 s; an image's second is not the sun's.
+        # 240 s of sun give 0.2 more; seconds of an image do not charge.
         ({**_CHARGED, "sunpoint_charge_per_s": 1 / 1200}, [], 240.0, 5.0),
         ({**_CHARGED, "sunpoint_charge_per_s": 1 / 1200}, [], 1e3, 272 / 30),
-        # 0.375 of the recorder for 0.15 an image.
+        # 0.375 of the recorder at 0.15 per image.
         (_FILLED, [], 1000.0, 2.5),
         ({**_FILLED, "telemetry_per_s": 75e-6}, [], 1000.0, 2.0),
-        # 75 s of contact take down two images; of one pass the longest counts alone.
+        # 75 s of contact downlink two images; only the longest contact of a pass counts.
         (_FILLED, [_pass(0.0, 75.0, 0), _pass(0.0, 50.0, 0)], 1e3, 4.5),
         (_FILLED, [_pass(0.0, 75.0, 0), _pass(90.0, 165.0, 1)], 1e3, 6.5),
-        # A full recorder: 90 s of contact make room for as much as they leave energy for.
+        # A full recorder: 90 s of contact make room for as many images as the energy then allows.
         (
             {"initial_battery_fraction": 0.9, "initial_recorder_fraction": 0.5,
              "contact_drain_per_s": 1 / 250},
@@ -145,7 +145,7 @@ _FILLED = {"initial_recorder_fraction": 0.125}
 def test_what_energy_and_downlink_add_up_to(
     changes: dict[str, Any], contacts: list[Task], sun_s: float, images: float
 ) -> None:
-    """Images are worth 0.7 each, which has no whole unit, and the last one counts in part."""
+    """Images are worth 0.7 each, no multiple of a unit; the last one counts in part."""
     bare: dict[str, Any] = {
         "battery_min_fraction": 0.3, "initial_battery_fraction": 1.0, "sunpoint_charge_per_s": 0.0,
         "collect_drain_per_s": 1 / 300, "contact_drain_per_s": 0.0, "recorder_max_fraction": 0.5,

@@ -1,4 +1,4 @@
-"""What the other tests take for the best plan, against every set of tasks there is."""
+"""The other tests' best plans, compared with every possible set of tasks."""
 
 from __future__ import annotations
 

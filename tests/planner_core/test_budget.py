@@ -1,4 +1,4 @@
-"""What a part of the work may spend."""
+"""Budgets: how much time each part of the work may spend."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_an_enforced_budget_whose_time_is_not_over_goes_on(time_s: float | None)
 
 
 def test_a_plan_is_ready_when_its_time_is_over_whatever_kernel_runs() -> None:
-    """A kernel reads no clock."""
+    """Kernels read no clock, so something else must stop them."""
 
     class Deaf(Rule):
         def solve(self, problem: Problem, budget: Budget, seed: int) -> Solution:
@@ -212,7 +212,7 @@ def test_a_quick_bound_is_asked_for_where_the_solver_has_none(
 def test_a_solver_leaves_time_for_what_follows_it(
     bounds: bool, objective: Objective, share: float
 ) -> None:
-    """Preferences, and contacts for the images of one that does not look for bounds."""
+    """For preferences, and for contacts if the solver computes no bounds."""
     left_s = list[float]()
 
     class Watched(Rule):

@@ -102,7 +102,7 @@ def test_the_paper_scenario_has_its_thirty_contacts() -> None:
 
 
 def test_real_land_targets_offer_about_four_collects_each(shared_data: Path) -> None:
-    """Prototypes of the same orbit found 4,034 to 4,122 collects for three thousands of them."""
+    """Prototypes of the same orbit found 4,034 to 4,122 collects for three sets of 1,000."""
     with (shared_data / "targets/landsat_1200.csv").open() as file:
         rows = list(csv.DictReader(file))[:1000]
     real = tuple(
@@ -128,7 +128,7 @@ def test_rows_are_in_the_order_of_the_plan_model(computed: ScenarioOpportunities
 
 
 def test_ties_are_ordered_by_place_id_as_text() -> None:
-    """A satellite that sees all places all day: every collect starts together."""
+    """A satellite that sees all sites all day: every collect starts at the same time."""
     fixed = satellite(orbit(mean_motion_rev_day=1.0027379, eccentricity=1e-5, inclination_deg=0.01))
     lon = float(
         np.degrees(
@@ -194,7 +194,7 @@ def test_angles_agree_with_skyfield(computed: ScenarioOpportunities) -> None:
 
 
 def test_the_view_at_any_instant_can_be_asked_for(computed: ScenarioOpportunities) -> None:
-    """At its middle it is the table's own; a contact begins and ends at the lowest elevation."""
+    """At an opportunity's middle it equals the table; contacts begin and end at 5 deg elevation."""
     asked = scenario(satellites=two_satellites(), spacing_s=20.0)
     table = computed.opportunities
     rows = np.arange(0, len(table), 7)
@@ -211,7 +211,7 @@ def test_the_view_at_any_instant_can_be_asked_for(computed: ScenarioOpportunitie
 
 
 def test_lines_of_sight_are_inertial_unit_vectors(computed: ScenarioOpportunities) -> None:
-    """Over a contact they turn as far as the pass does; tracking keeps them on the station."""
+    """During a contact they turn as far as in the pass; tracking keeps them on the station."""
     table = computed.opportunities
     for sight in (table.los_start, table.los_end):
         assert np.allclose(np.linalg.norm(sight, axis=1), 1.0, atol=1e-12)
@@ -243,7 +243,7 @@ def test_columns_are_compressed_where_that_makes_them_smaller(
     with zipfile.ZipFile(io.BytesIO(computed.to_bytes())) as archive:
         methods = {member.filename: member.compress_type for member in archive.infolist()}
     assert methods["satellite.npy"] == methods["start_s.npy"] == zipfile.ZIP_DEFLATED
-    assert methods["los_rate_end.npy"] == zipfile.ZIP_DEFLATED  # nothing but 0
+    assert methods["los_rate_end.npy"] == zipfile.ZIP_DEFLATED  # all zeros
     assert methods["los_start.npy"] == methods["azimuth_deg.npy"] == zipfile.ZIP_STORED
 
 
