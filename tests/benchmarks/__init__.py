@@ -1,1 +1,1 @@
-"""Tests of the benchmarks: that they run, never how long."""
+"""Tests of the benchmarks: that they run, not how long they take."""

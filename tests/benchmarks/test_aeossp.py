@@ -101,7 +101,7 @@ def test_actions_that_no_task_allows_are_refused(
 def test_a_plan_of_a_real_case_is_valid_and_survives_its_file(
     shared_data: Path, tmp_path: Path
 ) -> None:
-    """Three satellites of a training case and what they share, planned on the 5 s grid."""
+    """Three satellites of a training case and the targets they share, on the 5 s grid."""
     whole = read_case(aeossp(shared_data) / "train" / "case_0001")
     tasks = list(whole.tasks.values())[::4]
     case = replace(
@@ -123,7 +123,7 @@ def test_a_plan_of_a_real_case_is_valid_and_survives_its_file(
 def test_a_battery_that_does_not_last_costs_the_least_images(shared_data: Path) -> None:
     case, _, _ = fixture(shared_data, "full_completion_valid")
     (satellite,) = case.satellites.values()
-    # Idling takes 10 Wh; the image and the turn to it want a little more than what is left.
+    # Idling takes 10 Wh; the image and its slew need slightly more than remains.
     short = replace(satellite, initial_battery_wh=10.05)
     planned = plan_case(
         replace(case, satellites={satellite.id: short}), Rule(), time_s=None, seed=0

@@ -21,7 +21,7 @@ from benchmarks.flight.report import is_flyable
 from benchmarks.flight.rotations import BORESIGHT, bursts_s, draw, norm, solve, turned
 from tests.examples import examples
 
-# Half a minute of compilation.
+# Compilation takes half a minute.
 pytestmark = pytest.mark.full_size
 
 _OMM = {
@@ -54,7 +54,7 @@ def _files(*collects: tuple[float, float, float], hours: float = 0.5) -> tuple[A
         "battery_fraction": [0.5, 0.5], "recorder_fraction": [0.0, 0.0]}}  # fmt: skip
     horizon = {"start": _instant(0.0), "end": _instant(3600.0 * hours)}
     timeline = {"horizon": horizon, "use_resources": True, "satellites": [planned]}
-    # As they are read from files.
+    # In the form read from files.
     return json.loads(json.dumps(scenario)), json.loads(json.dumps(timeline))
 
 
@@ -64,7 +64,7 @@ def _mission(*collects: tuple[float, float, float]) -> Mission:
 
 
 def _below(mission: Mission, time_s: float) -> tuple[float, float]:
-    """Return the point under the satellite, by the sphere: near enough to look at."""
+    """Return the point below the satellite on a sphere: close enough to look at."""
     where = world.orbit(mission)
     x, y, z = world.satellite_km(where, time_s)[0]
     turned_rad = where.gmst_rad + world.EARTH_RATE_RAD_S * time_s
@@ -88,7 +88,7 @@ def test_a_turn_ends_on_the_line_of_sight_at_its_rate(
 ) -> None:
     direction = direction / norm(direction)
     if direction[BORESIGHT] < -0.99:
-        return  # nearly opposite: any axis would do
+        return  # almost opposite: any axis is right
     spin, end_spin, acceleration = 0.005 * spin, 0.005 * end_spin, 0.002
     found, cruise = solve(np.eye(3), spin, direction, end_spin, takes_s, acceleration)
     if not found or sum(bursts_s(spin, cruise, end_spin, acceleration)) > takes_s:
@@ -101,7 +101,7 @@ def test_a_turn_ends_on_the_line_of_sight_at_its_rate(
     assert norm(rates[0] - spin) < 1e-12
     changes = np.linalg.norm(np.diff(rates, axis=0), axis=1) / STEP_S
     assert changes.max() <= acceleration * (1.0 + 1e-9)
-    # What is drawn is what the rates come to.
+    # The drawn amounts match the rates.
     for row in (0, num_steps // 2, num_steps - 2):
         middle = (rates[row] + rates[row + 1]) / 2.0
         assert np.abs(turned(poses[row], middle * STEP_S) - poses[row + 1]).max() < 1e-5
@@ -158,7 +158,7 @@ def test_the_reference_keeps_its_limits_and_comes_in_time() -> None:
     assert [each.throughout for each in verdict.pointing] == [True] * 3
     assert verdict.share("collect") == 1.0
     assert verdict.nearest_sun_deg == pytest.approx(_nearest_sun_deg(mission, reference), abs=0.1)
-    # There is time to go to the sun before, between and after.
+    # There is time to visit the sun before, between and after.
     assert len(reference.visits) >= 3
     assert all(earlier[1] <= later[0] for earlier, later in
                zip(reference.visits, reference.visits[1:], strict=False))  # fmt: skip
@@ -186,7 +186,7 @@ def test_the_battery_is_what_the_sun_gives_and_the_recorder_what_was_written() -
     assert verdict.lowest_battery < 1.0 - 20.0 * mission.power.collect_per_s
     assert verdict.incidence["sun"] > 0.999
     assert verdict.charged["once at the sun"] <= verdict.charged["in all idle time"]
-    # The timeline's curve, which is made up, holds nothing; the recorder an image and telemetry.
+    # The timeline's curve is invented and empty; the recorder holds an image and telemetry.
     assert verdict.recorder_error == pytest.approx(0.01 + 1800.0 * 1e-6, abs=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""The paper's study runs each thing once and writes all that it promises."""
+"""The paper's study runs each case once and writes every promised file."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_no_worker_outlives_a_study_that_is_killed() -> None:
         assert study.stdout is not None
         assert study.stdout.readline() == b"ready\n"
         study.kill()
-        # The workers hold the other end too: this returns when the last of them is gone.
+        # The workers hold the other end too: this returns when the last of them has ended.
         assert study.communicate(timeout=60.0)[0] == b""
 
 

@@ -1,4 +1,4 @@
-"""The closed loop: its world keeps the referee's accounts, its luck is the same for all."""
+"""The closed loop: its world agrees with the referee, and luck is the same for all solvers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from planner_core.solvers.registry import Rule
 
 
 class Lucky(Luck):
-    """Nothing fails."""
+    """Luck in which nothing fails."""
 
     def image_fails(self, satellite: int, target_id: str, start: object) -> bool:
         return False
@@ -101,7 +101,7 @@ def test_luck_hangs_on_what_happens_and_not_on_who_asks() -> None:
 
 def test_a_short_loop_makes_a_row_once(tmp_path: Path) -> None:
     table = tmp_path / "rolling.csv"
-    # So many that the recorder fills: nothing else asks for contacts here.
+    # So many that the recorder fills: nothing else makes contacts necessary here.
     case = Case(policy="4", seed=1, days=1, num_first=300, num_a_day=50)
     run(table, "collected", case)
     run(table, "collected", case)
@@ -124,7 +124,7 @@ def test_no_target_is_imaged_twice_and_nothing_is_flown_that_was_not_asked_for()
         request = asked[report.target_id]
         assert request.target.due is not None
         assert request.asked_at < report.at <= request.target.due
-    # A pass a replan, but for those that are lost.
+    # One pass per replan, except those that are lost.
     assert len(loop.cpu_s) > 30
     assert set(POLICIES) == {"1", "2", "4", "pass"}
 

@@ -1,4 +1,4 @@
-"""SPOT-5: the published optima, and plans that keep the rules of the files."""
+"""SPOT-5: the published optima, and plans that obey the files' rules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The suite runs each case once, keeps what it came to, and says what has become worse."""
+"""The suite runs each case once, keeps its result, and reports what has become worse."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def test_families_differ_in_what_they_say(name: str) -> None:
 def test_the_quick_form_takes_five_minutes() -> None:
     names = list(FAMILIES)
     quick, full = (suite.cases(names, is_quick=is_quick) for is_quick in (True, False))
-    assert sum(case.budget_s for case in quick) <= 240.0  # the rest starts processes
+    assert sum(case.budget_s for case in quick) <= 240.0  # the rest is starting processes
     assert {case.family for case in full} == set(names)
     assert len(set(full)) == len(full) > len(quick)
 

@@ -1,4 +1,4 @@
-"""Missions drawn at random can be drawn again, and their faults are named."""
+"""Random missions can be drawn again, and their faults are named."""
 
 from __future__ import annotations
 

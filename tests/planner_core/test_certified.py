@@ -39,7 +39,7 @@ SPREADS = st.sampled_from(["one", "whole", "tenfold", "odd"])
 
 
 def with_spread(problem: Problem, seed: int, spread: str) -> Problem:
-    """Return the problem with rewards that are alike, whole, orders of magnitude apart, or odd."""
+    """Return the problem with rewards all 1, whole, orders of magnitude apart, or arbitrary."""
     rng = np.random.default_rng(seed)
     n = len(problem.target_ids)
     rewards = {
@@ -153,7 +153,7 @@ def test_with_a_worth_of_each_collect_it_equals_brute_force(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_crowded_starts_are_planned_within_a_true_bound(seed: int) -> None:
-    """Too large to be closed: the bound from multipliers of passes checks out for any plan."""
+    """Too large to be solved: the bound from multipliers of passes is verified for any plan."""
     problem = random_problem(
         seed, use_resources=False, num_collects=300, num_offers=8, num_targets=150, span_s=5000.0,
         has_rewards=seed == 2,
@@ -195,7 +195,7 @@ def test_crowded_problems_are_proven_and_the_proof_checks_out(
 def test_a_certificate_that_claims_less_than_a_plan_earns_is_never_sound(
     seed: int, agility: Agility
 ) -> None:
-    """Multipliers drawn at random, cuts of true sets: none of them refutes the optimum."""
+    """Random multipliers and cuts of true sets: no such certificate refutes the optimum."""
     problem = random_problem(
         seed, use_resources=False, num_collects=10, num_targets=4, span_s=300.0,
         agility=agility, max_turn_deg=25.0,
@@ -232,7 +232,7 @@ def test_sets_that_a_plan_may_take_two_of_prove_nothing() -> None:
 
 
 def _either_or() -> Problem:
-    """Return two targets of which a plan images one: their collects overlap."""
+    """Return two targets of which a plan can image one: their collects overlap."""
     tasks = [Task(kind=COLLECT, site=i, start_s=10.0 * i, end_s=10.0 * i + 30) for i in range(2)]
     return make_problem(tasks, num_targets=2, use_resources=False)
 
@@ -246,10 +246,10 @@ def test_a_certificate_proves_what_is_above_its_bound_and_not_what_a_plan_earns(
     free = Multipliers(of_targets=np.zeros(2))
     assert _refutes(1.00001, free)
     assert not _refutes(1.0, free)
-    # Nearer than sums are exact nothing is proven.
+    # Closer than the sums are exact, nothing is proven.
     assert not _refutes(1.0 + 1e-10, free)
     assert not _refutes(1.00001), "no multipliers, no proof"
-    # At these multipliers each image leaves its target what it is worth.
+    # With these multipliers the targets keep all worth: the bound is 2.
     assert not _refutes(1.5, Multipliers(of_targets=np.ones(2)))
 
 

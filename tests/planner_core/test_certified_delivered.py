@@ -1,4 +1,4 @@
-"""Plans of images on the ground: the bound holds, and "optimal" is what brute force finds."""
+"""Downlinked images: the bound holds, and "optimal" is what brute force finds."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ SEEDS = st.integers(0, 10**6)
 STARVED = replace(TIGHT, battery_min_fraction=0.5, initial_battery_fraction=0.62)
 
 _problem = partial(varied_problem, scarce=STARVED)
-# Every plan of these is replayed in a third of the time.
+# All plans of these can be replayed in a third of the time.
 _small = partial(_problem, num_collects=6, num_contacts=3)
 
 
@@ -68,12 +68,12 @@ def test_delivered_is_the_best_of_all_plans(
     num_satellites=st.integers(1, 2),
     has_quality=st.booleans(),
 )
-# The multiplier of an antenna ran off until it fitted no 32 bits.
+# An antenna's multiplier grew until it overflowed 32 bits.
 @example(
     seed=503436, dynamics="physical", collected_share=0.9, half_life_s=None, num_satellites=2,
     has_quality=True,
 )  # fmt: skip
-# Among worths of next to nothing HiGHS called an optimum what was none.
+# With worths close to zero HiGHS called a plan optimal that was not.
 @example(
     seed=257531, dynamics="paper", collected_share=1e-30, half_life_s=214.0, num_satellites=1,
     has_quality=False,
@@ -110,7 +110,7 @@ def test_highs_knows_what_stays_on_board(
     has_quality: bool,
     agility: Agility,
 ) -> None:
-    """Where turns take long a satellite may turn by way of an image of a target that it has."""
+    """If slews take long, a satellite may pass through a second image of a target."""
     problem = random_problem(
         seed,
         dynamics=dynamics,
@@ -129,7 +129,7 @@ def test_highs_knows_what_stays_on_board(
 
 
 def test_highs_rounds_no_bound_to_whole_sums() -> None:
-    """What it allows for then is less than relaxations with batteries are off by."""
+    """The tolerance it then uses is smaller than the error of relaxations with batteries."""
     problem = random_problem(3, num_collects=60, num_targets=30, num_contacts=4, span_s=3000.0)
     problem = with_objective(problem, Objective(collected_share=0.9))
     proven = Milp().solve(problem, Budget(), 0).proven
@@ -144,7 +144,7 @@ def test_highs_rounds_no_bound_to_whole_sums() -> None:
 def test_searches_count_what_stays_on_board(
     dynamics: Literal["physical", "paper"], search: type[ResourceWindows] | type[ChoiceSearch]
 ) -> None:
-    """To the telemetry, and the part of an image that a contact's end leaves on board."""
+    """Up to the telemetry, and the part of an image that is still on board as a contact ends."""
     lost, telemetry_per_s = 0.5, 1e-5
     resources = replace(
         TIGHT,
@@ -181,7 +181,7 @@ def test_searches_count_what_stays_on_board(
 def _searched(
     problem: Problem, search: type[ResourceWindows] | type[ChoiceSearch], seed: int
 ) -> tuple[Plan, float]:
-    """Return the plan that a search comes to, and what it counts it for."""
+    """Return the plan that a search finds, and the reward it assigns to it."""
     if search is ResourceWindows:
         windows = ResourceWindows(problem, seed)
         windows.make_moves(1000, Budget())
@@ -194,7 +194,7 @@ def _searched(
 
 
 def test_windows_weigh_contacts_against_images(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By images alone a contact is in the way of some."""
+    """If only images counted, contacts would be dropped for some of them."""
 
     def earned() -> float:
         total = 0.0
@@ -213,7 +213,7 @@ def test_windows_weigh_contacts_against_images(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_where_images_earn_most_when_they_are_taken_a_half_life_leaves_some_on_board() -> None:
-    """By the contacts that they take plans bring all of them down."""
+    """Contacts of plans made without the half-life would downlink every image."""
     name = "plans without the half-life"
     others = [one for one in STRATEGIES if one.name != name]
     assert len(others) == len(STRATEGIES) - 1
@@ -263,7 +263,7 @@ def test_no_image_of_the_plan_stays_on_board() -> None:
 
 
 def test_telemetry_younger_than_the_last_image_may_stay_on_board() -> None:
-    """A contact too short for all: it closes behind the first image, but not behind both."""
+    """A contact too short for both: its queue ends with the first image but not the second."""
     tasks = [collect(0, 100.0), collect(1, 290.0), contact(330.0, 374.0)]
     problem = make_problem(tasks, num_targets=2, resources=ROOMY)
     made = with_objective(problem, Objective.delivered())
@@ -312,7 +312,7 @@ def test_what_reasons_say_of_the_reward_is_what_the_referee_awards(
 
 
 def with_second_images(problem: Problem, plan: Plan) -> Plan:
-    """Return the plan with every further image of its targets that breaks nothing."""
+    """Return the plan with all further images of its targets that break no limit."""
     taken = {a.opportunity for a in plan.actions}
     sites = {int(problem.opportunities.site[row]) for row in taken}
     for row in np.flatnonzero(problem.opportunities.kind == COLLECT).tolist():
@@ -354,7 +354,7 @@ def test_reasons_replay_what_promises_most_and_no_more_than_allowed(
     monkeypatch.setattr(delivery, "_MOST_ACTIONS", most)
     fewer = explain(problem, plan, replay(problem, plan))
     longest = max(len(trial.actions) for trial in replayed)
-    # Beside the trials each satellite is replayed once as it is.
+    # Apart from the trials each satellite is replayed once unchanged.
     assert most <= sum(len(trial.actions) for trial in replayed) <= most + 3 * longest
     assert unsure(outcomes) < unsure(fewer)
 
@@ -376,7 +376,7 @@ def test_a_share_for_images_on_board_bounds_every_plan(
     has_quality: bool,
     multiplier: float,
 ) -> None:
-    """What `certified` makes of such multipliers is held by the property of all objectives."""
+    """How `certified` uses such multipliers is tested by the property of all objectives."""
     problem = _small(seed, dynamics, num_satellites, has_quality=has_quality)
     problem = with_objective(problem, Objective(collected_share=collected_share))
     best = best_reward(problem)
@@ -385,7 +385,7 @@ def test_a_share_for_images_on_board_bounds_every_plan(
 
 
 def test_what_stays_on_board_lowers_the_bound() -> None:
-    """Two images, and a contact that takes down one: half of the other's worth is out of reach."""
+    """Two images, a contact that downlinks one: half of the other's worth is out of reach."""
     tasks = [collect(0, 100.0), collect(1, 200.0), contact(330.0, 346.0)]
     bare = replace(ROOMY, telemetry_per_s=0.0, initial_recorder_fraction=0.0)
     problem = make_problem(tasks, num_targets=2, resources=bare)

@@ -1,4 +1,4 @@
-"""Longest paths: covering arcs say what the whole table says, in fewer pairs."""
+"""Longest paths: covering arcs say the same as the whole table, with fewer pairs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_arcs_are_the_pairs_with_nothing_in_between(
 
 
 def _nothing_between(satellite: SatelliteProblem) -> Bools:
-    """Return which pairs may follow each other and have no third task between. Shape (m, m)."""
+    """Return the pairs that may follow each other without a third task between. Shape (m, m)."""
     m = len(satellite)
     follows = np.array(
         [[a < b and satellite.transitions.allows(a, b) for b in range(m)] for a in range(m)],
@@ -52,7 +52,7 @@ def _nothing_between(satellite: SatelliteProblem) -> Bools:
 @examples(60)
 @given(seed=SEEDS)
 def test_of_chains_as_heavy_the_one_handed_on_first_counts(seed: int) -> None:
-    """Values and tasks passed along the arcs, a task of no worth handing on what it was given."""
+    """Values and tasks are passed along the arcs; a task of no worth passes on what it received."""
     problem = random_problem(
         seed, num_collects=40, num_targets=30, use_resources=False, span_s=1500.0
     )
@@ -73,7 +73,7 @@ def test_of_chains_as_heavy_the_one_handed_on_first_counts(seed: int) -> None:
 @examples(60)
 @given(seed=SEEDS, slew_rate_deg_s=st.sampled_from([1.0, 0.3]))
 def test_chains_are_as_heavy_as_those_of_the_listing(seed: int, slew_rate_deg_s: float) -> None:
-    """Alg. 3 in plain Python, over all pairs; tasks without worth stand in no chain."""
+    """Alg. 3 in plain Python, over all pairs; tasks of no worth are in no chain."""
     problem = random_problem(
         seed, num_collects=40, num_targets=30, use_resources=False, max_turn_deg=25.0,
         agility=Agility(slew_rate_deg_s=slew_rate_deg_s), span_s=1500.0,

@@ -1,4 +1,4 @@
-"""What may stand in one plan, with acceleration limits and settling, against plain closures."""
+"""Transitions with acceleration limits and settling, compared with plain closures."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ AGILITIES = st.builds(
 def test_a_slew_is_the_quickest_from_rest_to_rest(
     rate: float, acceleration: float, angle: float
 ) -> None:
-    """The angle under the profile of speed: up at the limit, along at the rate, down again."""
+    """The angle is the integral of the speed: up at the limit, along at the rate, down again."""
     took = slew_s(angle, rate, acceleration)
     t = np.linspace(0.0, took, 20_001)
     speed = np.minimum(np.minimum(acceleration * t, acceleration * (took - t)), rate)
     turned = float(np.trapezoid(speed, t))
-    # The samples miss the corners of the profile a little.
+    # The samples cut the corners of the profile a little.
     assert turned == pytest.approx(angle, rel=1e-4, abs=1e-9)
 
 
@@ -52,7 +52,7 @@ def test_a_slew_is_the_quickest_from_rest_to_rest(
 def test_two_slews_take_no_less_than_one_through_both(
     rate: float, acceleration: float, parts: tuple[float, float]
 ) -> None:
-    """What ``transitive_closure`` rests on."""
+    """The assumption of ``transitive_closure``."""
     first, second = (slew_s(part, rate, acceleration) for part in parts)
     assert first + second >= slew_s(sum(parts), rate, acceleration) - 1e-9
     assert slew_s(max(parts), rate, acceleration) >= max(first, second) - 1e-12

@@ -1,4 +1,4 @@
-"""Queues before contacts, where images are worth less the later they come down."""
+"""Queues before contacts, if images are worth less the later they are downlinked."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_no_plan_beats_any_multipliers(
     for multipliers in (free, some):
         whole, _ = queue_value(problem, multipliers, per_collect, exact_contacts=exact)
         assert whole >= best - 1e-9
-        # Paths may be left out, as long as no plan is among them that is better.
+        # Paths may be left out, as long as they include no better plan.
         level = float(rng.uniform(0.5, 1.0)) * best
         value, found = queue_value(
             problem,
@@ -102,7 +102,7 @@ def test_no_plan_beats_any_multipliers(
 def test_what_follows_a_contact_and_what_leads_to_it_add_up_to_a_whole_path(
     seed: int, half_life_s: float
 ) -> None:
-    """Over all two contacts the most is that of all paths, and each two have plans below it."""
+    """The maximum over all pairs of contacts is the maximum over all paths."""
     problem = _problem(seed, "physical", 1, num_contacts=3)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
     (one,) = latency_relaxations(problem)
@@ -121,7 +121,7 @@ def test_what_follows_a_contact_and_what_leads_to_it_add_up_to_a_whole_path(
 
 
 def _narrow(seed: int, drain_per_s: float) -> Problem:
-    """Return a mission whose contacts take down an image or two each."""
+    """Return a mission whose contacts downlink one or two images each."""
     rng = np.random.default_rng(seed)
     tasks = [collect(target, float(t)) for target, t in enumerate(rng.integers(0, 500, 5))]
     begins_s = 40.0 + 70.0 * np.sort(rng.choice(12, 4, replace=False))
@@ -140,7 +140,7 @@ def _narrow(seed: int, drain_per_s: float) -> Problem:
 def test_images_that_a_contact_has_no_time_for_count_with_a_later_one(
     drain_per_s: float, is_promise_of_use: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Promises name the next contact; where all are taken it is known without one."""
+    """Promises name the next contact; if all contacts are taken it is known without one."""
     by_queues, by_contacts, without_promises = [], [], []
     none = np.zeros(5)
     for seed in range(40):
@@ -249,7 +249,7 @@ def _plan_with(problem: Problem, contacts: list[int], multipliers: Floats) -> Pl
 def test_contacts_that_must_be_taken_cost_their_energy_and_no_more(
     seed: int, half_life_s: float
 ) -> None:
-    """Where every path takes them plans keep their limits all the same."""
+    """Even if every path takes them, plans keep their limits."""
     problem = _problem(seed, "physical", 1, num_contacts=3)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)[:1].tolist()

@@ -1,4 +1,4 @@
-"""Programs with fixed contacts: their values, multipliers that prove them, plans that keep them."""
+"""Programs with fixed contacts: their values, the multipliers proving them, valid plans."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_multipliers_from_amid_prove_what_a_corner_is_worth(seed: int, dynamics:
     corner = FixedContacts(problem, every, (), Budget(), 0).relaxed()
     assert relaxation.value == pytest.approx(corner, rel=0.02)
     assert np.all((relaxation.multipliers >= 0.0) & (relaxation.multipliers <= problem.best_worth))
-    # Without contacts the programme over paths is no weaker than the linear one.
+    # Without contacts the bound by paths is as tight as the linear program's.
     proven = resource_value(problem, relaxation.multipliers, 1e-3)
     assert proven <= relaxation.value + 0.05
     assert np.all(np.isfinite(relaxation.losses))
@@ -146,7 +146,7 @@ def test_programs_count_what_stays_on_board_as_the_other_searches_do(
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 def test_the_contacts_of_the_best_plan_lead_to_others(dynamics: Dynamics) -> None:
-    """From the contacts of a good plan alone, and few of its images, all of it is found."""
+    """From a good plan's contacts and one of its images, the search finds a plan as good."""
     num_better = 0
     for seed in range(8):
         problem = _shared(seed, dynamics, 1 + seed % 2, 0.5, 24)
@@ -162,7 +162,7 @@ def test_the_contacts_of_the_best_plan_lead_to_others(dynamics: Dynamics) -> Non
         while search.fix_own_contacts():
             assert best.reward > before
             before = best.reward
-        # With less room than that above the plan the next image is hard to find.
+        # With less room than this between plan and bound, the next image is hard to find.
         room = TUNING.room * problem.typical_worth
         assert best.reward >= replay(problem, good).reward - room
         num_better += best.reward > replay(problem, few).reward

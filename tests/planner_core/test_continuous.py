@@ -1,4 +1,4 @@
-"""Continuous starts: plans the referee agrees with, and bounds that none exceeds."""
+"""Continuous starts: plans the referee confirms, and bounds that no plan exceeds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from planner_core.certified.strategies.every import solved
 from planner_core.certified.tuning import TUNING
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
-from planner_core.precedence.time_windows import time_windows_of, view_of
+from planner_core.precedence.time_windows import spans_of, view_of
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -48,7 +48,7 @@ SEEDS = st.integers(0, 10**6)
 
 
 def planned(problem: Problem, budget: Budget, seed: int, moves_per_task: float) -> Solution:
-    """Return what all strategies come to in so many moves."""
+    """Return what all strategies find in this number of moves."""
     return solved(problem, budget, seed, 0.0, Effort(moves_per_task=moves_per_task))
 
 
@@ -59,11 +59,11 @@ AGILITIES = st.sampled_from(
 
 
 def best_reward(problem: Problem) -> float:
-    """Return the best reward of one satellite with continuous starts, by trying every sequence.
+    """Return the best reward of one satellite with free starts, by trying every sequence.
 
-    It turns faster than its lines of sight, so each task is best begun as early as it can be.
+    Its slews are faster than its lines of sight, so each task is best begun as early as possible.
     """
-    spans, view = time_windows_of(problem, 0), view_of(problem, 0)
+    spans, view = spans_of(problem, 0), view_of(problem, 0)
     reward = problem.best_worth
     best = 0.0
 
@@ -195,7 +195,7 @@ def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
 
 
 def test_what_bounds_fixed_starts_is_not_taken_for_free_ones() -> None:
-    """A bound over the opportunities alone may lie below a plan with continuous starts."""
+    """Computed from the opportunities alone, such a bound may be below a plan with free starts."""
     problem = flat_problem(3, num_targets=14, horizon_s=700.0)
     grid = replace(problem, continuous_starts=False, pointing=None)
     bound = Certified().solve(grid, Budget(), 0).proven
@@ -223,7 +223,7 @@ def test_progress_with_resources_tells_no_bound_of_fixed_starts() -> None:
 def test_what_fits_is_put_into_each_better_plan_with_fixed_starts_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Not into the first, which is the rule's; and windows go on from the best plan there is."""
+    """Not into the first, which is the rule's; and windows continue from the best plan."""
     problem = flat_problem(
         2, num_targets=30, num_contacts=2, horizon_s=1500.0, use_resources=True, spacing_s=60.0
     )
@@ -299,7 +299,7 @@ def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets
 @examples(30)
 @given(seed=SEEDS)
 def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
-    """Accesses around a blocked interval may be used on either side of it."""
+    """An access that contains a blocked interval may be used on either side of it."""
     problem = flat_problem(seed, num_targets=12, horizon_s=900.0)
     rng = np.random.default_rng(seed)
     from_s = round(float(rng.uniform(100.0, 600.0)), 3)
@@ -319,7 +319,7 @@ def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
     timeline = replay(pinned, search.plan)
     assert not timeline.violations
     assert any(a.opportunity == kept for a in search.plan.actions)
-    spans = time_windows_of(pinned, 0)
+    spans = spans_of(pinned, 0)
     is_before = spans.close_s + spans.length_s <= from_s + 1e-6
     assert (is_before | (spans.open_s >= from_s + 60.0 - 1e-6)).all()
 

@@ -48,7 +48,7 @@ def own_starts(judged: Judged) -> list[int]:
     ]
 
 
-def test_continuous_starts_gain_images_that_the_referee_grants(judged: Judged) -> None:
+def test_free_starts_gain_images_that_the_referee_grants(judged: Judged) -> None:
     fixed = plan_scenario(
         replace(scenario(), continuous_starts=False), Certified(), 0, Budget()
     ).timeline
@@ -71,8 +71,8 @@ def test_every_solver_answers_such_a_scenario(name: str, use_resources: bool) ->
     assert answer.timeline.reward <= answer.bound.value + 1e-9
 
 
-def test_each_target_left_out_has_a_reason_true_of_continuous_starts(judged: Judged) -> None:
-    """Whatever is said to displace actions fits once they are gone, by the referee."""
+def test_each_target_left_out_has_a_reason_true_of_free_starts(judged: Judged) -> None:
+    """If the actions named as blocking are removed, the image fits, judged by the referee."""
     problem, plan = judged.problem, judged.solution.plan
     left = [o for o in judged.outcomes if o.reason is not None and o.reason.blocking]
     assert left
@@ -101,7 +101,7 @@ def pinned(judged: Judged, pins: Pins) -> Judged:
 
 
 def test_an_action_with_its_own_start_can_be_kept(judged: Judged) -> None:
-    """A plan of pinned own starts holds each of them, to the millisecond."""
+    """If actions with their own starts are pinned, the plan holds each of them, to the ms."""
     horizon, problem = judged.scenario.horizon, judged.problem
     table = problem.opportunities
     actions = [judged.solution.plan.actions[p] for p in own_starts(judged)][:25]
@@ -118,7 +118,7 @@ def test_an_action_with_its_own_start_can_be_kept(judged: Judged) -> None:
     site = again.problem.opportunities.site
     held = {(int(site[a.opportunity]), a.start_s) for a in again.solution.plan.actions}
     assert {(int(table.site[a.opportunity]), a.start_s) for a in actions} <= held
-    # Beside them at least what the plan had fits again.
+    # Around them at least as much fits as in the original plan.
     assert again.timeline.reward >= judged.timeline.reward - 2.0
     moved = replace(
         again.solution.plan,

@@ -1,4 +1,4 @@
-"""Multipliers by recorders alone: the programme finds the best path, and no plan beats them."""
+"""Multipliers with recorders alone: label setting finds the best path; no plan beats the bound."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Dynamics = Literal["physical", "paper"]
 def best_by_enumeration(
     network: Network, levels: DataLevels, weight: Floats, end_cost: Floats
 ) -> float:
-    """Return the most that any path gains, path by path."""
+    """Return the most that any path gains, by enumeration."""
 
     def from_here(last: int, level: int) -> float:
         best = -float(end_cost[level]) if level <= levels.end else -np.inf
@@ -101,7 +101,7 @@ def test_no_plan_beats_the_multipliers(
 def test_where_few_images_come_down_the_bound_knows_by_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Batteries say nothing of it, and the exact programmes come to it too slowly."""
+    """Batteries do not bind, and the exact dynamic programmes converge too slowly."""
 
     def bound_of(problem: Problem) -> float:
         search = ResourceSearch(Incumbent(problem, Budget(), 0.0), 0)

@@ -1,4 +1,4 @@
-"""When images are on the ground, and what they then earn."""
+"""When images are downlinked, and what they then earn."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def all_of(problem: Problem) -> Timeline:
 
 
 def test_the_hand_worked_queue() -> None:
-    """0.05 at the start, telemetry, two images of 0.03: down at 0.002 a second."""
+    """0.05 on board at the start, telemetry, two images of 0.03: downlinked at 0.002 a second."""
     problem = make_problem(
         [collect(0, 100.0), collect(1, 200.0), contact(300.0, 360.0), contact(500.0, 600.0)],
         num_targets=2,
@@ -115,7 +115,7 @@ def test_what_an_image_earns_by_where_it_is(
 def test_an_image_without_data_is_down_when_the_next_contact_begins(
     held: float, dynamics: Dynamics
 ) -> None:
-    """All that waited before it is down already, which is no reason to count it as older."""
+    """Whatever was recorded before it is down already, which does not make the image older."""
     empty = replace(
         ROOMY, collect_fill_per_s=0.0, telemetry_per_s=0.0, initial_recorder_fraction=held
     )
@@ -129,7 +129,7 @@ def test_an_image_without_data_is_down_when_the_next_contact_begins(
 
 
 def test_a_contact_that_takes_down_all_it_can_ends_with_its_last_bit() -> None:
-    """Its pieces, added one by one, may fall short of their sum by a rounding."""
+    """Its pieces, added one by one, may differ from their sum by a rounding error."""
     pieces = np.array([[0.0, 10.0, 0.01], [10.0, 20.0, 0.03], [20.0, 30.0, 0.02]])
     points = _one_after_another(pieces, 0.2, 0.8 + 1e-12)
     assert points[0] == (0.0, 0.2)
@@ -166,7 +166,7 @@ def test_a_half_life_is_a_time(half_life_s: float) -> None:
 
 
 def _queue(problem: Problem, plan: Plan) -> dict[int, float]:
-    """Return when each image is down, by a queue of pieces that is served second by second."""
+    """Return when each image is down, from a queue of pieces served second by second."""
     r = problem.satellites[0].resources
     kind, step_s = problem.opportunities.kind, 0.05
     queue: deque[list[float]] = deque([[r.initial_recorder_fraction, -1.0]])
@@ -213,7 +213,7 @@ def test_the_queue_is_that_of_pieces_served_one_after_another(seed: int) -> None
         if action.delivered_s is not None and action.position is not None
     }
     expected = _queue(problem, plan)
-    # What is down in the very last piece of a contact may be down just before or after.
+    # Whatever arrives in the very last piece of a contact may arrive just before or after its end.
     for position in found.keys() & expected.keys():
         assert found[position] == pytest.approx(expected[position], abs=0.2)
     near_an_end = [
@@ -223,7 +223,7 @@ def test_the_queue_is_that_of_pieces_served_one_after_another(seed: int) -> None
 
 
 def _is_close(problem: Problem, plan: Plan, found: dict[int, float], position: int) -> bool:
-    """Return whether an image is done as a contact ends, where pieces are too coarse to tell."""
+    """Return whether an image is finished as a contact ends, which pieces are too coarse for."""
     kind = problem.opportunities.kind
     ends = [a.end_s for a in plan.actions if kind[a.opportunity] == CONTACT]
     return position in found and any(abs(found[position] - end) < 0.2 for end in ends)

@@ -1,4 +1,4 @@
-"""Downlinks by elevation: volumes, parts of passes, and that every method counts the same."""
+"""Downlinks by elevation: volumes, parts of passes, and that all methods agree on them."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _built(scenario: Scenario) -> Problem:
 
 
 def passes_problem(seed: int, dynamics: Dynamics = "physical") -> Problem:
-    """Return a small crowded problem: passes at drawn rates, each as a whole and in two parts."""
+    """Return a small crowded problem: passes with drawn rates, each whole and in two parts."""
     rng = np.random.default_rng(seed)
     tasks = []
     for _ in range(7):
@@ -89,7 +89,7 @@ def passes_problem(seed: int, dynamics: Dynamics = "physical") -> Problem:
     for number in range(2):
         start_s, length_s = round(float(rng.uniform(0, 850)), 3), float(rng.integers(60, 140))
         time_s = np.linspace(start_s, start_s + length_s, 12)
-        # Never slower than telemetry comes in.
+        # Never slower than the telemetry rate.
         rates.append(PassRate(time_s=time_s, per_s=rng.uniform(3e-5, 1 / 100, 12)))
         for cut in (0.0, 0.15, 0.3):
             begin_s, end_s = (round(start_s + part * length_s, 3) for part in (cut, 1.0 - cut))
@@ -132,7 +132,7 @@ def test_a_pass_adds_up_to_what_many_small_steps_do(seed: int) -> None:
 def test_an_amount_is_down_when_the_pass_says_so_and_not_before(seed: int) -> None:
     rng = np.random.default_rng(seed)
     time_s = np.sort(rng.uniform(0.0, 600.0, 20))
-    # Nothing comes down between two instants without a rate.
+    # Nothing is downlinked between two instants without a rate.
     rate = PassRate(time_s=time_s, per_s=rng.uniform(0.0, 1.0, 20) * (rng.random(20) > 0.3))
     whole = float(rate.until(time_s[-1:])[0])
     amount = np.array([0.0, *rng.uniform(0.0, whole, 5), whole])
@@ -146,7 +146,7 @@ def test_an_amount_is_down_when_the_pass_says_so_and_not_before(seed: int) -> No
 def _drawn_rate(rng: np.random.Generator) -> PassRate:
     start_s, length_s = round(float(rng.uniform(0.0, 900.0)), 3), float(rng.uniform(0.5, 600.0))
     num = int(rng.integers(2, 40))
-    # Nothing comes down between two instants without a rate.
+    # Nothing is downlinked between two instants without a rate.
     per_s = rng.uniform(0.0, 1.0, num) * (rng.random(num) > 0.2)
     return PassRate(time_s=np.linspace(start_s, start_s + length_s, num), per_s=per_s)
 
@@ -293,7 +293,7 @@ def test_steps_and_referee_agree_on_the_recorder(dynamics: Dynamics, seed: int) 
         last = row
         assert recorder == pytest.approx(action.recorder_end, abs=1e-9)
         if action.recorder_end == 1.0:
-            # Far beyond the limit: no planner goes on from a recorder that has overflowed.
+            # Far beyond the limit: no planner continues after a recorder has overflowed.
             assert not stays_within
             return
     waits_s = resources.data_end_s - (resources.data_from_s[last] if last >= 0 else 0.0)
@@ -400,7 +400,7 @@ def test_plain_passes_are_offered_whole_alone() -> None:
 
 
 def _two(antennas: int = 1, **own: Any) -> Scenario:
-    """Return two plain satellites that pass stations half a minute after each other."""
+    """Return two plain satellites that pass over stations half a minute apart."""
     plain = satellite(orbit())
     ahead = replace(mean_elements(plain.orbit), mean_anomaly_deg=2.0, norad_cat_id=7)
     both = (plain, replace(plain, id="ahead", name="Ahead", orbit=ahead))
@@ -432,7 +432,7 @@ def test_passes_that_two_satellites_want_at_a_time_are_offered_in_halves(
                 and table.start_s[row] > table.access_start_s[row])
             ]  # fmt: skip
             num_shared += is_shared
-            # Once a station that needs setup is set up there may be no time for a half.
+            # Setup at a station may leave no time for a half.
             assert len(halves) == 2 * is_shared or (is_shared and table.site[rows[0]] == 1)
             volume = one.volume[problem.local_row[rows]]
             for row in halves:
@@ -469,7 +469,7 @@ def test_a_booking_in_whole_seconds_tells_a_pass_from_its_first_half() -> None:
 
 
 def test_two_satellites_share_a_pass() -> None:
-    """With halves both bring an image down in one pass, where one of them did with the whole."""
+    """With halves both downlink an image in one pass; with whole contacts only one could."""
     problem = _built(_two(downlink_per_s=0.01))
     table = problem.opportunities
     contacts = np.flatnonzero(table.kind == CONTACT)
@@ -489,7 +489,7 @@ def test_two_satellites_share_a_pass() -> None:
 
 
 def contacts_of_pass(table: Opportunities, row: int) -> Bools:
-    """Return which contacts are their whole pass, of those of a row's pass."""
+    """Return which contacts cover the whole pass that a row belongs to."""
     is_its = table.access == table.access[row]
     is_whole: Bools = is_its & (table.start_s == table.access_start_s)
     is_whole &= table.end_s == table.access_end_s

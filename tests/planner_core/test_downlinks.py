@@ -1,4 +1,4 @@
-"""Contacts are added, and images taken elsewhere, where images earn more with that."""
+"""Contacts are added, and images moved, if that makes images earn more."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_no_image_is_lost_and_no_contact_dropped(
 
 
 def test_an_image_that_stays_on_board_is_taken_where_it_comes_down() -> None:
-    """One image of a target, after the last contact, of a plan that takes all contacts."""
+    """One image of a target after the last contact, in plans that take all contacts."""
     moved = 0
     for seed in range(100):
         problem = with_objective(

@@ -1,4 +1,4 @@
-"""The next slice goes to the strategy that gained most, and nobody is forgotten."""
+"""The next slice goes to the strategy that gained most, and none is forgotten."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from tests.planner_core.problems import random_problem
 
 
 class Log:
-    """Notes who has a slice."""
+    """Record which strategy has a slice."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
 
     def gaining(self, name: str, gains: Sequence[float]) -> Slices:
-        """Return slices that lower the bound by so much, one after the other."""
+        """Return slices that lower the bound by the given gains, one after the other."""
 
         def slices(search: Search) -> Iterator[None]:
             for gain in gains:
@@ -76,7 +76,7 @@ def test_who_gained_most_goes_on_and_nobody_waits_for_long() -> None:
             strategy("b", log.gaining("b", [9.0, 9.0, 9.0, 9.0, 9.0, 2.0, 2.0])),
         ]
     ).solved()
-    # b gains more, until a has waited for several slices; then what b gains is less than a's.
+    # b gains more, until a has waited for several slices; then b gains less than a.
     waits = "b" * TUNING.several
     assert TUNING.several == 4
     assert "".join(log.names) == "a" + waits + "a" + "bbb" + "a"
@@ -153,12 +153,12 @@ def test_the_slices_of_a_search_beside_are_slices_of_a_strategy() -> None:
             yield
 
     search_by([strategy("a", log.gaining("a", [1.5] * 3)), strategy("b", beside)]).solved()
-    # Of the inner search: x and y begin, y gains more. Outside that is a gain of b.
+    # In the inner search x and y begin and y gains more. For the outer search that is b's gain.
     assert "".join(log.names) == "ax|aay|y|x|"
 
 
 def test_who_is_beside_a_search_gets_its_first_plan_only_where_none_is_better() -> None:
-    """A proof that this is the best may take all the time there is."""
+    """A proof that the first plan is the best may take all the time there is."""
     log = Log()
 
     def better(search: Search) -> Iterator[None]:
@@ -247,7 +247,7 @@ def test_every_strategy_of_the_list_has_a_problem_and_a_name_of_its_own() -> Non
 
 
 def test_agility_alone_is_asked_by_its_own_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By those for limits it would ask for agility alone again, without end."""
+    """With the strategies for limits it would call agility-only planning again, without end."""
     began: list[list[str]] = []
 
     def solved(search: Search) -> Solution:

@@ -1,4 +1,4 @@
-"""The bound that pays a target once in each pass: between plans and the plain bound, checkable."""
+"""The bound that pays a target once per pass: above all plans, below the plain bound, provable."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NEVER = np.zeros(1, dtype=np.uint8)
 def spaced_problem(
     seed: int, *, num_accesses: int = 3, num_offers: int = 5, span_s: float = 200.0
 ) -> Problem:
-    """Return a problem whose accesses offer collects 9 s apart, in many variations."""
+    """Return a problem whose accesses offer collects 9 s apart; much varies with the seed."""
     rng = np.random.default_rng(seed)
     problem = random_problem(
         seed,
@@ -82,7 +82,7 @@ def test_whatever_the_multipliers_it_lies_between_the_optimum_and_the_plain_boun
 @examples(40)
 @given(seed=st.integers(0, 10**6))
 def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
-    """Too large for brute force: many accesses are open at once, and bits are used again."""
+    """Too large for brute force: many accesses are open at once, and label bits are reused."""
     problem = spaced_problem(seed, num_accesses=40, num_offers=8, span_s=1500.0)
     reward = replay(problem, improved(problem, Plan(), 30.0, Budget(), seed)).reward
     rng = np.random.default_rng(seed)
@@ -96,7 +96,7 @@ def test_crowded_problems_never_hold_a_better_plan(seed: int) -> None:
 @examples(100)
 @given(seed=st.integers(0, 10**6))
 def test_it_holds_for_weights_that_differ_from_collect_to_collect(seed: int) -> None:
-    """Against the heaviest path without repetition, found by trying all."""
+    """Compared with the heaviest path without repetition, found by enumeration."""
     problem = spaced_problem(seed, num_accesses=2, num_offers=4)
     network = arc_network_of(problem)
     memory = memory_of(problem, network)
@@ -110,7 +110,7 @@ def test_it_holds_for_weights_that_differ_from_collect_to_collect(seed: int) -> 
 
 
 def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
-    """Return what the satellites' best chains are worth that take each target once at most."""
+    """Return the worth of the satellites' best chains that take each target at most once."""
     table, total = problem.opportunities, 0.0
     for satellite in problem.satellites:
         chains: list[tuple[float, int, frozenset[int]]] = [(0.0, -1, frozenset())]
@@ -129,7 +129,7 @@ def heaviest_without_repetition(problem: Problem, worth: Floats) -> float:
 
 
 def test_a_target_in_view_for_long_is_paid_once() -> None:
-    """Ten collects of one access, 30 s apart: the plain bound pays them all."""
+    """Ten collects of one access, 30 s apart: the plain bound pays for all of them."""
     tasks = [
         Task(kind=COLLECT, site=0, start_s=30.0 * k, end_s=30.0 * k + 30.0, access=0)
         for k in range(10)
@@ -168,7 +168,7 @@ def test_the_quick_bound_pays_a_target_once_in_each_pass() -> None:
 
 @pytest.mark.parametrize("seed", [0, 3, 12])
 def test_a_fleet_s_bound_pays_a_target_once_in_each_pass_too(seed: int) -> None:
-    """Below that of plain paths, from which a fleet's multipliers come."""
+    """It is below that of plain paths, which give a fleet's multipliers."""
     problem = spaced_problem(seed, num_accesses=60, num_offers=8, span_s=1000.0)
     assert sum(len(satellite) > 0 for satellite in problem.satellites) == 2
 

@@ -1,4 +1,4 @@
-"""Release and due times and sensor types: what they leave, what is said of what they do not."""
+"""Release and due times and sensor types: what they exclude, and the reasons given for it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def at(offset_s: float) -> datetime:
 
 @cache
 def everything() -> tuple[Scenario, ScenarioOpportunities]:
-    """Return two satellites that follow each other over a crowd of targets that ask nothing."""
+    """Return two satellites, one behind the other, over many targets without requirements."""
     rng = np.random.default_rng(5)
     scenario = Scenario(
         horizon=hours(0.5),
@@ -76,7 +76,7 @@ def everything() -> tuple[Scenario, ScenarioOpportunities]:
 
 
 def asking(scenario: Scenario, seed: int) -> Scenario:
-    """Return the scenario with times and types for some of its targets."""
+    """Return the scenario with times and sensor types required by some of its targets."""
     rng = np.random.default_rng(seed)
     targets = []
     for target in scenario.targets:
@@ -96,7 +96,7 @@ def asking(scenario: Scenario, seed: int) -> Scenario:
 
 
 def allowed_rows(scenario: Scenario, whole: ScenarioOpportunities) -> np.ndarray:
-    """Return, one by one, the opportunities that times and types leave."""
+    """Return the opportunities that times and types allow, checked one by one."""
     table = whole.opportunities
     rows = []
     for row in range(len(table)):
@@ -199,13 +199,13 @@ def test_the_referee_rejects_a_collect_outside_its_times() -> None:
 
 
 def target(**fields: Any) -> Target:
-    """Return a target near the equator, unless told otherwise."""
+    """Return a target near the equator, with the given fields."""
     near: dict[str, Any] = {"id": "t", "lat_deg": 3.0, "lon_deg": 0.0}
     return Target(**near | fields)
 
 
 def low_and_typed(**of_target: Any) -> Scenario:
-    """Return one target under an equatorial orbit of a visible sensor."""
+    """Return one target under an equatorial orbit with a visible sensor."""
     return Scenario(
         horizon=hours(6.0),
         satellites=(

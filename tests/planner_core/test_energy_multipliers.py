@@ -1,4 +1,4 @@
-"""Bounds by energy alone: the programme finds the best path, and no plan beats the bound."""
+"""Bounds by energy alone: label setting finds the best path, and no plan beats the bound."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ Dynamics = Literal["physical", "paper"]
 
 
 def ascent(problem: Problem, num_epochs: int, seed: int = 0) -> Ascent:
-    """Return the ascent by energy alone, from nothing."""
+    """Return the ascent by energy alone, from zero multipliers."""
     begin = np.zeros(len(problem.target_ids))
     return ascent_on_energy(problem, EnergyPaths(problem), begin, num_epochs, seed)
 
 
 def best_by_enumeration(network: Network, levels: EnergyLevels, weight: Floats) -> float:
-    """Return the most that any path gains, path by path."""
+    """Return the most that any path gains, by enumeration."""
 
     def from_here(last: int, energy: int) -> float:
         best = 0.0

@@ -1,4 +1,4 @@
-"""The engine stays small: its constants are counted."""
+"""The engine stays small: the number of its constants is limited."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from planner_core.certified.tuning import Tuning
 ENGINE: Final = Path(planner_core.certified.__file__).parent
 MODULES: Final = {str(path.relative_to(ENGINE)): path for path in sorted(ENGINE.rglob("*.py"))}
 NUMBERS: Final = {"signs.py", "sizes.py", "tolerances.py", "tuning.py"}
-"""Modules whose business is numbers."""
+"""Modules that may define numbers."""
 
 _MOST_CONSTANTS: Final = 60
-_ALLOWED: Final = {"VERSION"}  # of documents
+_ALLOWED: Final = {"VERSION"}  # document versions
 
 
 def numbers_named_in(tree: ast.Module) -> Iterator[str]:
-    """Yield the names at the top of a module that stand for numbers written there."""
+    """Yield the module-level names to which a number is assigned."""
     for statement in tree.body:
         if isinstance(statement, ast.Assign):
             targets, value = statement.targets, statement.value

@@ -1,4 +1,4 @@
-"""Fleets without resources: brute force, true bounds, and the same plan whatever the threads."""
+"""Fleets without resources: brute force, true bounds, the same plan with any number of threads."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SEEDS = st.integers(0, 10**6)
 
 
 def fleet(seed: int, slew_rate_deg_s: float = 1.0) -> Problem:
-    """Return a crowded fleet that wants more of the same targets than it can take."""
+    """Return a crowded fleet that competes for targets."""
     return random_problem(
         seed, use_resources=False, num_collects=240, num_targets=90, num_satellites=8,
         has_rewards=seed % 2 == 0, max_turn_deg=25.0,
@@ -44,7 +44,7 @@ def fleet(seed: int, slew_rate_deg_s: float = 1.0) -> Problem:
 
 
 def searched(problem: Problem, budget: Budget, seed: int) -> FleetSearch:
-    """Return a search that has gone through all its steps."""
+    """Return a search that has completed all its steps."""
     search = FleetSearch(Incumbent(problem, budget, 0.0), seed)
     search.ascend()
     search.start()
@@ -107,7 +107,7 @@ def test_what_streams_are_worth_together_is_taken(monkeypatch: pytest.MonkeyPatc
     search = FleetSearch(Incumbent(problem, Budget(), 0.0), 0)
     for _ in search.search(20.0):
         pass
-    assert known[0] == 2  # a plan of each stream
+    assert known[0] == 2  # one plan from each stream
     assert search.best.reward >= replay(problem, best).reward
 
 
@@ -142,7 +142,7 @@ def test_a_large_fleet_searches_among_what_costs_the_bound_little() -> None:
     ends = np.empty(len(network.first) - 1, dtype=np.int32)
 
     def bound(held: int | None) -> float:
-        """Return what paths are worth of which one holds a task, whatever it costs."""
+        """Return the worth of the best paths; one must contain the held task, if any."""
         weight = np.maximum(worth - multiplier, 0.0)
         if held is not None:
             weight[held] = 1e6
@@ -189,7 +189,7 @@ def test_who_cancels_gets_the_plan_so_far_and_its_bound() -> None:
 
 
 def test_paths_of_a_fleet_need_no_table_of_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Plan, bound and window search of a large fleet; the table grows with density squared."""
+    """Plan, bound and window search of a large fleet; a table would grow with density squared."""
 
     def refuse(*_: object) -> None:
         raise AssertionError

@@ -1,4 +1,4 @@
-"""Fleets with battery and recorder: plans beside multipliers, and beside programs."""
+"""Fleets with battery and recorder: plans found along with multipliers, and with programs."""
 
 from __future__ import annotations
 

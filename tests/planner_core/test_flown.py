@@ -1,6 +1,6 @@
-"""Horizons that begin in the middle of a plan: what was flown leads to where the satellite is.
+"""Horizons that begin in the middle of a plan: flown actions give the satellite's state.
 
-The plan as a whole, judged from its own beginning, is what all is compared with.
+Everything is compared with the whole plan, judged from its own beginning.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def mission(kind: str, **more: Any) -> Scenario:
 
 @dataclass(frozen=True, kw_only=True)
 class Whole:
-    """A plan from its beginning, and its actions in words."""
+    """A plan from its beginning, and its actions as a client describes them."""
 
     scenario: Scenario
     problem: Problem
@@ -123,7 +123,7 @@ def continued(
     whole: Whole, start: datetime, freeze_until: datetime, *states: State,
     flown: tuple[Flown, ...] | None = None,
 ) -> Scenario:  # fmt: skip
-    """Return the question that goes on from a plan at an instant: all of it stays that may."""
+    """Return the scenario that continues a plan from an instant and keeps all that remains."""
     own = whole.scenario.satellites[0]
     before = State(
         satellite_id=own.id, at=BEGIN, recorder_fraction=0.0,
@@ -151,7 +151,7 @@ def built(scenario: Scenario) -> Problem:
 
 
 def instants(whole: Whole) -> list[datetime]:
-    """Return instants between actions, in the middle of an image and of a contact."""
+    """Return instants between actions, during an image and a contact, and at their edges."""
     images = [one for one in whole.actions if one.target_id is not None]
     contacts = [one for one in whole.actions if one.station_id is not None]
     image, contact = images[len(images) // 2], contacts[len(contacts) // 2]
@@ -169,7 +169,7 @@ def instants(whole: Whole) -> list[datetime]:
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_a_plan_goes_on_as_if_its_horizon_had_not_begun_anew(kind: str) -> None:
-    """Battery, recorder, what comes down when, and the reward of the rest."""
+    """Battery, recorder, times of delivery, and the reward of the rest."""
     whole = whole_of(kind)
     line = whole.timeline.satellites[0].resources
     assert line is not None
@@ -187,8 +187,8 @@ def test_a_plan_goes_on_as_if_its_horizon_had_not_begun_anew(kind: str) -> None:
         in_contact = any(
             one.station_id == "sv" and one.start < start < one.end for one in whole.actions
         )
-        # The rest of a pass is set up once more: a little less comes down in it.
-        # A rate by elevation is sampled from the horizon's start on.
+        # The rest of a pass is set up again: a little less is downlinked.
+        # A rate by elevation is sampled from the start of the horizon.
         slack = 25.0 * 8 / 3000 if in_contact else 5e-5 if kind == "elevation" else 1e-6
         at_s = np.linspace(0.0, problem.horizon_s, 500)
         assert np.interp(at_s, own.time_s, own.battery) == pytest.approx(
@@ -219,7 +219,7 @@ def test_a_plan_goes_on_as_if_its_horizon_had_not_begun_anew(kind: str) -> None:
             sorted(after.items()), sorted(before.items()), strict=True
         ):
             assert mine == pytest.approx(other, abs=0.3)
-        # All is earned once: what was taken before earned its half then.
+        # Everything is earned once: images taken before earned their half then.
         earned_before = sum(
             0.5
             + (
@@ -260,7 +260,7 @@ def _levels(whole: Whole, flown: tuple[Flown, ...], start: datetime) -> tuple[fl
 
 
 def test_what_failed_draws_energy_and_holds_no_data() -> None:
-    """The last image before the horizon: with its data, with some, with none, and not tried."""
+    """The last image before the horizon failed or succeeded, with various data, or was skipped."""
     whole = whole_of("free")
     image = [one for one in whole.actions if one.target_id is not None][8]
     start = image.end + timedelta(seconds=20)
@@ -300,7 +300,7 @@ def test_a_contact_that_failed_leaves_its_data_on_board() -> None:
 
 
 def test_telemetry_in_the_middle_corrects_what_was_planned() -> None:
-    """From the state on, and no sooner: levels follow what is flown after it."""
+    """From that state on; only actions flown later change the levels."""
     whole = whole_of("free")
     start = BEGIN + timedelta(hours=2)
     at = BEGIN + timedelta(hours=1)
@@ -342,7 +342,7 @@ def test_a_replan_from_a_state_keeps_the_frozen_part_to_the_bit() -> None:
 
 
 def _newer(scenario: Scenario, shift_deg: float) -> Scenario:
-    """Return the scenario with elements by which the satellite is further along its orbit."""
+    """Return the scenario with elements that put the satellite further along its orbit."""
     own = scenario.satellites[0]
     newer = replace(own, orbit=orbit(mean_anomaly_deg=shift_deg))
     assert scenario.replan is not None
@@ -352,7 +352,7 @@ def _newer(scenario: Scenario, shift_deg: float) -> Scenario:
 
 
 def test_newest_elements_leave_what_is_frozen_and_match_what_is_not() -> None:
-    """Some seconds along the orbit: accesses move by as much."""
+    """A shift of seconds along the orbit moves accesses by as much."""
     whole = whole_of("free")
     freeze = BEGIN + timedelta(hours=2)
     scenario = _newer(continued(whole, BEGIN, freeze), 0.5)

@@ -1,4 +1,4 @@
-"""Clear skies and urgency: what collects are worth by them, and which questions are refused."""
+"""Clear-sky probability and urgency: their effect on worth, and which scenarios are refused."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def series(target: list[int], time_s: list[float], clear: list[list[float]]) -> 
 
 
 def forecast(number: int, seed: int = 0) -> Forecast:
-    """Return skies over all targets, half of them every three hours, half every five."""
+    """Return forecasts for all targets, half of them every three hours, half every five."""
     draw = np.random.default_rng(seed)
     halves = np.arange(0, number, 2), np.arange(1, number, 2)
     times_s = np.arange(0.0, 1.2 * DAY_S, 10800.0), np.arange(0.0, 1.3 * DAY_S, 18000.0)

@@ -1,4 +1,4 @@
-"""Frozen actions that lead beyond a limit: the replan is made, and no plan is blamed for them."""
+"""Frozen actions that exceed a limit: the replan is made, and no plan is blamed for them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ TASKS = [
 
 
 def _after(problem: Problem, frozen: list[int], until_s: float) -> Problem:
-    """Return what is left of a problem whose plan is frozen to an instant."""
+    """Return the remaining problem, with actions frozen up to an instant."""
     kept = tuple(Kept(row=row, pointer=f"/replan/base/{i}") for i, row in enumerate(frozen))
     return apply_pins(problem, Pinned(kept=kept, frozen_until_s=until_s))
 
@@ -53,7 +53,7 @@ def _question(problem: Problem, base: list[int], *promised: int) -> Question:
 
 
 def _lost_pass() -> Problem:
-    """Return a plan of which a contact was lost: the image that is flown next does not fit in."""
+    """Return a problem whose lost contact leaves too little room for the image flown next."""
     whole = make_problem(TASKS, num_targets=3, resources=NEARLY_FULL)
     return _after(whole, [0], 100.0)
 
@@ -97,7 +97,7 @@ def test_a_pin_that_breaks_limits_by_itself_is_still_refused() -> None:
 
 
 def test_an_image_that_finds_no_room_at_all_earns_nothing() -> None:
-    """Data is lost where the recorder is full, not where it is beyond its limit."""
+    """Data is lost if the recorder is full, not if it is just beyond its limit."""
     full = replace(NEARLY_FULL, initial_recorder_fraction=0.95)
     problem = _after(make_problem(TASKS, num_targets=3, resources=full), [0], 100.0)
     timeline = replay(problem, Plan.of(problem, [0, 2]))
@@ -155,7 +155,7 @@ def test_a_promise_that_would_overfill_the_recorder_is_kept_later_or_refused() -
 
 
 def _worse_than_planned(seed: int, dynamics: Dynamics) -> Problem | None:
-    """Return a plan that is frozen to an instant, from a worse state than it was made for."""
+    """Return a problem with a frozen part, from a worse state than its plan was made for."""
     rng = np.random.default_rng(seed)
     whole = random_problem(
         seed, num_collects=5, num_contacts=3, num_targets=5, dynamics=dynamics, has_rewards=True
@@ -177,7 +177,7 @@ def _worse_than_planned(seed: int, dynamics: Dynamics) -> Problem | None:
 
 
 def _plans(problem: Problem) -> Iterator[tuple[Plan, Timeline]]:
-    """Yield whatever can be done with what is frozen, within limits or not."""
+    """Yield every plan that holds the frozen part, within limits or not."""
     for rows in possible_plans(problem):
         plan = Plan.of(problem, rows)
         timeline = replay(problem, plan, in_detail=False)

@@ -1,4 +1,4 @@
-"""The paper's mission at the paper's size: a day over 1,000 land scenes."""
+"""The paper's mission at the paper's size: a day with 1,000 land scenes."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_with_resources_the_improved_search_leads_the_papers_methods(dynamics: D
 
 
 def test_many_stations_cost_no_images() -> None:
-    """A contact is on offer all the time, and each of them costs the power of many images."""
+    """Some contact is always available, and each costs the energy of many images."""
     scenario = paper_scenario(300, 2, use_resources=True)
     stations = tuple(
         GroundStation(id=f"g{lat}/{lon}", name="", lat_deg=lat, lon_deg=lon)
@@ -92,7 +92,7 @@ def test_many_stations_cost_no_images() -> None:
 
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> None:
-    """Cut short it has proven something all the same, and no plan of anyone contradicts it."""
+    """Even if cut short it has proven a bound, and no solver's plan exceeds it."""
     problem = day(use_resources=True, dynamics=dynamics)
     solution = Milp().solve(problem, expiring(bounds_told(2)), 0)
     own = replay(problem, solution.plan)
@@ -104,7 +104,7 @@ def test_with_resources_the_bound_of_the_program_is_true(dynamics: Dynamics) -> 
 
 
 def test_many_collects_of_each_access_are_planned_as_well() -> None:
-    """Ten times the opportunities, and no fewer images than with one collect per access."""
+    """More than five times the opportunities, and more images than with one collect per access."""
     scenario = paper_scenario(TARGETS, 2, use_resources=False)
     spaced = problem_of(replace(scenario, collect_spacing_s=15.0))
     plain = day(use_resources=False)
@@ -124,7 +124,7 @@ def test_a_choice_of_starts_is_planned_near_its_bound() -> None:
     assert solution.proven is not None
     assert proofs.is_proven(problem, solution.proven)
     assert judged(problem, ForwardSearch()).reward <= solution.bound
-    # Its program would take gigabytes: the answer is what it would have started from.
+    # Its program would take gigabytes: the answer is the plan it would have started from.
     milp = Milp(formulation="pairwise", moves_per_task=0.1).solve(problem, Budget(), 0)
     assert milp.bound is None
     assert replay(problem, milp.plan).is_valid
@@ -141,7 +141,7 @@ def test_where_all_targets_fit_in_that_is_proven() -> None:
 
 @pytest.mark.parametrize("share", [0.5, 0.1])
 def test_shares_begin_with_the_plan_for_images_where_agility_alone_decides(share: float) -> None:
-    """Most of the worth is that of the images, whatever is said of when they come down."""
+    """Images account for most of the worth, whenever they are downlinked."""
     images, shares = (
         problem_of(scenario_from_content(document(1, own, None))) for own in (1.0, share)
     )

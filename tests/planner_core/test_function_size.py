@@ -1,4 +1,4 @@
-"""Functions stay short, and kernels narrow: what is wide takes long to read and to compile."""
+"""Functions stay short and kernels narrow: wide ones take long to read and to compile."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MOST_LINES, _MOST_LINES_OF_A_KERNEL, _MOST_ARGUMENTS = 60, 100, 10
 
 
 def lines_of(function: ast.FunctionDef, source: list[str]) -> int:
-    """Return how many lines of code a function has: neither docstring, comments nor blank ones."""
+    """Return a function's number of lines without docstring, comments and blank lines."""
     first, last = function.lineno, function.end_lineno or function.lineno
     docstring = range(0)
     if ast.get_docstring(function) is not None:

@@ -1,4 +1,4 @@
-"""Programs that know by which contact each image comes down."""
+"""Programs that know which contact downlinks each image."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ DYNAMICS = st.sampled_from(["physical", "paper"])
 
 
 def _program_bound(problem: Problem) -> float:
-    """Return what HiGHS proves, which a solver would raise to what its plan earns."""
+    """Return HiGHS's own bound, which a solver would raise to its plan's reward."""
     program = plan_program(problem, "antichain", TOUCHING).program
     engine = Engine(program, Budget(), 0, is_chained=True)
     return engine.search(None, 0.0, None, lambda _reward, _bound: None).bound
@@ -79,13 +79,13 @@ def test_no_plan_beats_the_program(
 
 
 def test_a_contact_brings_down_what_it_has_time_for() -> None:
-    """The younger image with the first contact, which takes down one, the other with the next."""
+    """The younger image with the first contact, which has room for one; the other with the next."""
     tasks = [collect(0, 100.0), collect(1, 200.0), contact(330.0, 345.0), contact(600.0, 615.0)]
     bare = replace(ROOMY, telemetry_per_s=0.0, initial_recorder_fraction=0.0)
     problem = make_problem(tasks, num_targets=2, resources=bare)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=300.0))
     assert problem.satellites[0].volume[2] == pytest.approx(30.0 * bare.collect_fill_per_s)
-    # None is worth more than if it came down as soon as it can.
+    # None earns more than if it were downlinked as soon as possible.
     most = problem.worth[1] + 2.0 ** (-(600.0 - 130.0) / 300.0)
     assert Milp().solve(problem, Budget(), 0).bound == pytest.approx(most, abs=1e-4)
 

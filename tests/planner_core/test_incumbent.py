@@ -1,4 +1,4 @@
-"""One plan, one bound, and one meaning of "optimal" for all searches."""
+"""One plan, one bound and one meaning of "optimal" for all searches."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from planner_core.solvers.base import Solver
 from planner_core.solvers.registry import Certified, Milp
 from tests.planner_core.problems import Task, make_problem, random_problem
 
-BEYOND = 5.0 * SAME  # what is missing, as a share: less than once counted as nothing
+BEYOND = 5.0 * SAME  # a relative gap, smaller than one that was once ignored
 
 
 def problem_with_rewards(*, use_resources: bool) -> Problem:
-    """Return a problem whose rewards are not whole, with a pin that HiGHS has to respect."""
+    """Return a problem with fractional rewards and a pin that HiGHS has to respect."""
     tasks = [
         Task(kind=COLLECT, site=i, start_s=100.0 * i, end_s=100.0 * i + 30.0) for i in range(3)
     ]
@@ -48,7 +48,7 @@ def test_what_highs_leaves_open_is_not_called_optimal(
         return replace(outcome, bound=outcome.bound * (1.0 + share))
 
     monkeypatch.setattr(Engine, "search", leaves_open)
-    # No other bound is to settle it.
+    # No other bound may close the gap.
     monkeypatch.setattr(
         "planner_core.certified.incumbent.accessible", lambda _: Bound(value=np.inf, proof="milp")
     )

@@ -1,4 +1,4 @@
-"""What was compiled is taken from disk as long as it is what the sources say, and no longer."""
+"""Compiled kernels are loaded from disk as long as they match the sources, and no longer."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ _AS_IT_IS = {"factor": "2.0", "entry": "3.0", "added": "b", "remark": "# as it i
 
 
 def _run(folder: Path, kernels: Path, **changes: str) -> tuple[list[float], list[int]]:
-    """Return what ``walk`` and ``apart`` say, and whether each was taken from disk."""
+    """Return the results of ``walk`` and ``apart``, and whether each was loaded from disk."""
     folder.mkdir(exist_ok=True)
     (folder / "steps.py").write_text(_STEPS.format(**_AS_IT_IS | changes))
     (folder / "walk.py").write_text(_WALK)

@@ -1,4 +1,4 @@
-"""Cells with land, against the outlines that they are made of."""
+"""Land cells, compared with the outlines that they are made from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Images that are worth less the later they come down: bounds by contacts, and plans near them."""
+"""Images worth less the later they are downlinked: bounds by contacts, and plans close to them."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ Dynamics = Literal["physical", "paper"]
 def best_by_enumeration(
     network: Network, levels: EnergyLevels, layers: Layers, weight: Floats
 ) -> float:
-    """Return the most that any path gains, path by path and layer by layer."""
+    """Return the most that any path gains, by enumeration over paths and layers."""
     m = len(network.site)
 
     def from_here(last: int, energy: int, layer: int) -> float:
-        """Return the most from a task on, in a layer that is entered or gone on in."""
+        """Return the most after a task, within a layer."""
         is_last = layer == len(layers.first) - 1
         best = 0.0 if is_last else -np.inf
         for k in range(last + 1, m):
@@ -111,7 +111,7 @@ def test_the_programme_finds_the_best_path(
 
 
 def multipliers_of(problem: Problem, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Return multipliers of targets and contacts, some of them nothing."""
+    """Return multipliers of targets and contacts, some of them zero."""
     num_contacts = int((problem.opportunities.kind == CONTACT).sum())
     targets = rng.uniform(-0.5, 1.0, len(problem.target_ids)) * problem.best_worth
     contacts = rng.uniform(-10.0, 20.0, num_contacts)
@@ -157,7 +157,7 @@ def test_no_plan_beats_any_multipliers(
 def test_no_plan_beats_what_estimates_of_energy_lead_to(
     seed: int, num_satellites: int, half_life_s: float
 ) -> None:
-    """With turns to the sun multipliers come from an estimate; what they prove does not."""
+    """With turns to the sun multipliers come from an estimate; their bound does not."""
     problem = sunny_problem(seed, num_satellites=num_satellites, num_collects=6, num_contacts=3)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=half_life_s))
     best = best_reward(problem)
@@ -191,7 +191,7 @@ def test_small_problems_end_at_or_near_the_optimum() -> None:
 
 
 def test_a_multiplier_of_contacts_lowers_the_bound() -> None:
-    """Contacts that could each take down a few images only, at next to no energy."""
+    """Contacts could each downlink only a few images, and cost almost no energy."""
     problem = random_problem(3, num_collects=200, num_targets=90, num_contacts=6, span_s=6000.0)
     problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=900.0))
     free = latency_value(
@@ -222,7 +222,7 @@ def test_the_bound_of_a_plan_is_proven_by_its_document() -> None:
 
 
 def test_worth_in_a_queue_is_what_the_referee_awards() -> None:
-    """Three images before one contact that takes down two, and another one later."""
+    """Three images before a contact that downlinks two, and another contact later."""
     tasks = [collect(0, 100.0), collect(1, 150.0), collect(2, 200.0)]
     tasks += [contact(330.0, 390.0), contact(600.0, 700.0)]
     problem = make_problem(tasks, num_targets=3, resources=ROOMY)
@@ -231,7 +231,7 @@ def test_worth_in_a_queue_is_what_the_referee_awards() -> None:
     earned = replay(problem, plan).collected
     worth = worth_with(problem, [3, 4], plan)
     assert worth[:3] == pytest.approx([earned[target].worth for target in range(3)])
-    # An image more waits for what is in the queue before it, and none for what comes after.
+    # An image waits for the images before it in the queue, not for those after it.
     alone = worth_with(problem, [3, 4], Plan.of(problem, [0, 3, 4]))
     assert alone[0] == pytest.approx(worth[0])
     assert alone[2] > worth[2]
@@ -240,7 +240,7 @@ def test_worth_in_a_queue_is_what_the_referee_awards() -> None:
 
 
 def test_plans_take_contacts_for_young_images() -> None:
-    """With a short half-life a plan takes more contacts than where only the last counts."""
+    """With a short half-life a plan takes more contacts than if the time of delivery is free."""
     problem = random_problem(5, num_collects=240, num_targets=90, num_contacts=8, span_s=9000.0)
     young = with_objective(problem, Objective(collected_share=0.0, half_life_s=600.0))
     late = with_objective(problem, Objective.delivered())
@@ -280,7 +280,7 @@ def _fleet_in_a_hurry() -> Problem:
 
 
 def _offering(*plans: Plan) -> Strategy:
-    """Return a strategy that offers plans where the half-life does not count, one in a slice."""
+    """Return a strategy for objectives without half-life that offers one plan per slice."""
 
     def slices(search: Search) -> Iterator[None]:
         for plan in plans:
@@ -299,7 +299,7 @@ def _plans_of_growing_worth() -> tuple[Problem, list[Plan]]:
 
 
 def test_a_fleet_s_search_without_the_half_life_gives_way_after_each_slice() -> None:
-    """From its second plan on: the first is the rule's. Once it ends as before, no more follow."""
+    """From its second plan on; the first is the rule's. It stops once a run ends as the last."""
     hurried, plans = _plans_of_growing_worth()
     search = Search(Incumbent(hurried, Budget(), 0.0), 0, [_offering(*plans)])
     full, known = search.engine(FullWorth), list[Plan]()
@@ -316,7 +316,7 @@ def test_a_fleet_s_search_without_the_half_life_gives_way_after_each_slice() -> 
 
 
 def test_a_fleet_s_search_that_gains_nothing_ends_after_some_times() -> None:
-    """Each time with another plan: what is best is known from the beginning."""
+    """Each run offers another plan, but the best one is known from the beginning."""
     hurried, plans = _plans_of_growing_worth()
     begun = list[int]()
 
@@ -335,7 +335,7 @@ def test_a_fleet_s_search_that_gains_nothing_ends_after_some_times() -> None:
 def _days_begun(
     hurried: Problem, good: Plan, offered: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> list[Plan]:
-    """Return the plans from which days are planned anew, without success."""
+    """Return the plans from which days are replanned, without success."""
     begun = list[Plan]()
 
     def noted(_: Problem, plan: Plan, *args: object) -> None:
@@ -358,7 +358,7 @@ def _days_begun(
 def test_a_fleet_s_days_wait_for_a_plan_and_begin_with_the_best(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It may be the plan that was offered, with more contacts."""
+    """The given plan may win, after contacts were added to it."""
     hurried, plans = _plans_of_growing_worth()
     begun = _days_begun(hurried, plans[-1], plans[-3], monkeypatch)
     assert replay(hurried, plans[-3]).reward < replay(hurried, plans[-1]).reward
@@ -380,7 +380,7 @@ def test_missions_without_contacts_or_without_data_have_bounds_too(
 
 
 def test_a_large_problem_has_a_better_plan_before_its_bounds() -> None:
-    """Where one answer takes long the plan must not wait for all that a bound needs."""
+    """If one bound takes long, the plan must not wait for it."""
     num_better = 0
     for seed in range(10):
         problem = random_problem(

@@ -1,4 +1,4 @@
-"""Light, time, side and direction: each limit against a plain judgement every second."""
+"""Light, time, side and direction: each limit compared with a plain check every second."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ WIDE = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=60.0)
 
 
 def plainly_within(path: Ephemeris, limits: Sensor | Target, target: Target, t: Floats) -> Bools:
-    """Judge the limits of light, time, side and direction instant by instant."""
+    """Check the limits of light, time, side and direction instant by instant."""
     site = Sites.of([target])
     position, velocity = path.state_itrf(t)
     sun = path.sun_itrf(t)
@@ -81,7 +81,7 @@ def assert_same_windows(sensor: Sensor, target: Target, span_h: float = 24.0) ->
 
 
 def test_a_collect_keeps_clear_of_the_sun() -> None:
-    """Over the year's end the sun stands in the south: seen from the north it glares behind."""
+    """Around New Year the sun is in the south: seen from the north it glares behind a target."""
     path = propagate(satellite(orbit(inclination_deg=97.4)), hours(24.0))
     site = Sites.of([NORTH])
     sensor = replace(WIDE, sun_exclusion_deg=75.0)
@@ -201,7 +201,7 @@ def test_each_target_keeps_its_own_limits_in_a_mixed_list() -> None:
 
 
 def test_a_high_target_has_a_high_horizon() -> None:
-    """Level with 8 km of height, the satellite rises later and sets earlier than at sea level."""
+    """For a target 8 km high the satellite rises later and sets earlier than at sea level."""
     mountain = replace(NORTH, alt_m=8000.0)
     limits = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=90.0)
     path = propagate(satellite(), hours(3))

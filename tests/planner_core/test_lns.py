@@ -1,4 +1,4 @@
-"""The window search: plans stay valid, never get worse, and are the same for the same seed."""
+"""The window search: plans stay valid, never get worse, and depend only on the seed."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_small_problems_end_at_the_optimum(num_offers: int) -> None:
 
 
 def test_a_plan_is_never_given_up_for_targets_that_are_only_preferred() -> None:
-    """Preferences steer between plans that earn the same; what is kept stays."""
+    """Preferences decide between plans that earn the same; the current plan stays."""
     problem = random_problem(
         4, use_resources=False, num_collects=40, num_targets=20, num_offers=4, span_s=900.0
     )

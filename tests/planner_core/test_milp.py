@@ -1,4 +1,4 @@
-"""The MILP: the optimum by brute force in every setting, and true bounds all the way."""
+"""The MILP: the brute-force optimum in every setting, and true bounds throughout."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def assert_equals_brute_force(problem: Problem, formulation: Any) -> None:
     assert solution.proven is not None
     assert solution.bound == pytest.approx(best, abs=1e-4)
     assert solution.bound >= best - 1e-9
-    # Multipliers may suffice; where they do, they prove it to whoever asks.
+    # Multipliers may suffice; then they are the proof.
     if problem.use_resources or formulation == "pairwise":
         assert solution.proven.proof == "milp"
     assert is_proven(problem, solution.proven) is not False
@@ -91,7 +91,7 @@ def test_it_equals_brute_force(
 def test_tight_resources_and_the_eclipse_are_exact(
     seed: int, dynamics: Dynamics, telemetry_per_s: float
 ) -> None:
-    """Little energy, a filling recorder, contacts that overlap tasks, some of it in shadow."""
+    """Little energy, a filling recorder, contacts that overlap tasks, partly in eclipse."""
     resources = replace(
         TIGHT, initial_battery_fraction=0.55, telemetry_per_s=telemetry_per_s, eclipse_aware=True,
         sunpoint_charge_per_s=1 / 900, initial_recorder_fraction=0.3,
@@ -137,7 +137,7 @@ def test_no_plan_beats_the_relaxation(
 
 
 def test_a_target_already_collected_may_be_the_way_to_another() -> None:
-    """From t0 to t1 there is only t0 again, which turns the satellite on the way."""
+    """Only a second image of t0 gets from t0 to t1, as the satellite turns during it."""
     tasks = [
         Task(kind=COLLECT, site=0, start_s=0.0, end_s=30.0),
         Task(kind=COLLECT, site=0, start_s=40.0, end_s=70.0, turn_deg=50.0),
@@ -151,7 +151,7 @@ def test_a_target_already_collected_may_be_the_way_to_another() -> None:
 
 
 def test_two_satellites_share_a_station_up_to_its_antennas() -> None:
-    """Both must empty their recorders over the one station at the same time."""
+    """Both must downlink over the one station at the same time."""
     tasks = []
     for satellite in (0, 1):
         tasks += [
@@ -185,7 +185,7 @@ def test_however_early_it_stops_the_plan_is_valid_and_the_bound_true(
 
 
 def test_a_plan_that_touches_a_limit_is_not_taken() -> None:
-    """Two images fill the recorder to its limit exactly: the bound may count both, no plan may."""
+    """Two images fill the recorder exactly to its limit: the bound may count both, no plan may."""
     resources = replace(
         TIGHT, initial_recorder_fraction=0.0, collect_fill_per_s=0.25 / 30, telemetry_per_s=0.0,
         recorder_max_fraction=0.5, initial_battery_fraction=1.0,
@@ -218,7 +218,7 @@ def crowded(seed: int) -> Problem:
 
 
 def is_bounded(progress: Progress) -> bool:
-    """Return whether HiGHS has begun: no bound is told before."""
+    """Return whether HiGHS has begun: no bound is reported before."""
     return progress.bound is not None
 
 
@@ -247,8 +247,8 @@ def highs_threads() -> list[threading.Thread]:
 def test_an_answer_does_not_wait_for_highs(
     monkeypatch: pytest.MonkeyPatch, num_questions: int
 ) -> None:
-    """HiGHS is held where it asks whether to go on: what is known by then comes back."""
-    for thread in highs_threads():  # of earlier tests: they would ask this one's budget
+    """HiGHS is blocked in its callback: the best result so far is returned."""
+    for thread in highs_threads():  # of earlier tests: they would check this test's budget
         thread.join()
     budget, may_go_on = Budget(), threading.Event()
     asked = 0
@@ -294,7 +294,7 @@ def test_incumbents_and_bounds_are_reported_while_it_searches() -> None:
 
 
 def test_it_begins_with_plans_whose_images_come_down(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The rule asks for a contact once its recorder is rather full."""
+    """The rule only takes contacts once its recorder is rather full."""
     nothing = Outcome(columns=None, bound=np.inf, is_infeasible=True, log="")
     monkeypatch.setattr(WholeProgram, "_search", lambda *_: nothing)
     problem = make_problem(
@@ -317,16 +317,16 @@ def test_a_wanted_gap_is_enough() -> None:
 
 
 def num_threads() -> int:
-    """Return how many threads the system counts, when those of earlier searches have ended."""
+    """Return the system's count of threads, once those of earlier searches have ended."""
     for thread in highs_threads():
         thread.join()
     return len(os.listdir("/proc/self/task"))
 
 
 def wait_for_threads(number: int) -> int:
-    """Return how many threads the system counts, when it counts no more than that or in a minute.
+    """Return the system's count of threads once it is at most ``number``, or after a minute.
 
-    It may still count one that has been joined, for a moment.
+    A joined thread may still be counted for a moment.
     """
     patience_s = time.monotonic() + 60.0
     while (now := len(os.listdir("/proc/self/task"))) > number and time.monotonic() < patience_s:
@@ -335,7 +335,7 @@ def wait_for_threads(number: int) -> int:
 
 
 def test_a_solve_that_ends_by_itself_leaves_no_thread_behind() -> None:
-    """Workers fork from a process that has planned with every solver."""
+    """Workers are forked from a process that has planned with every solver."""
     before = num_threads()
     solution = Milp().solve(random_problem(5), Budget(), 0)
     assert not highs_threads()
@@ -344,7 +344,7 @@ def test_a_solve_that_ends_by_itself_leaves_no_thread_behind() -> None:
 
 
 def test_the_thread_of_a_solve_that_was_cut_short_ends_soon() -> None:
-    """It has answered before HiGHS comes to ask whether to go on."""
+    """The answer is returned before HiGHS reaches its next callback."""
     before = num_threads()
     Milp().solve(crowded(2), expiring(is_bounded), 0)
     assert wait_for_threads(before) <= before
@@ -361,7 +361,7 @@ def test_the_thread_of_a_solve_that_was_cut_short_ends_soon() -> None:
 def test_a_program_of_some_tasks_is_the_whole_one_without_the_others(
     seed: int, dynamics: Dynamics, telemetry_per_s: float, num_satellites: int, is_slow: bool
 ) -> None:
-    """What a task costs in the paper's dynamics depends on the tasks around, taken or not."""
+    """In the paper's dynamics a task's cost depends on its neighbours, taken or not."""
     resources = replace(
         TIGHT, telemetry_per_s=telemetry_per_s, initial_recorder_fraction=0.3,
         initial_battery_fraction=0.6,
@@ -392,7 +392,7 @@ def _optimum(program: Program) -> float | None:
 
 @pytest.mark.parametrize("seed", [2, 6, 9])
 def test_no_bound_is_told_below_the_optimum_of_a_program_without_a_start(seed: int) -> None:
-    # Here what HiGHS does first, with a part of the program, has a lower bound of its own.
+    # Here HiGHS first solves a part of the program, which has a lower bound of its own.
     rng = np.random.default_rng(seed)
     program = Program()
     program.add_columns(rng.integers(5, 20, 300).astype(np.float64))

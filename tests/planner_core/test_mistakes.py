@@ -1,4 +1,4 @@
-"""Warnings for what is nearly always a mistake: where they are due, and where not."""
+"""Warnings about likely mistakes: when they appear, and when not."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STATION = GroundStation(id="n", name="North", lat_deg=78.2, lon_deg=15.4)
 
 
 def optical(**sensor: object) -> Scenario:
-    """Return a mission in watts and megabits that images by day alone, with a station."""
+    """Return a mission in watts and megabits that images by day only, with a station."""
     asked = scenario(Quality())
     first = asked.satellites[0]
     resources = replace(Resources.paper(first.orbit.period_s), recorder_capacity_mbit=1000.0)
@@ -73,7 +73,7 @@ def test_data_must_have_a_way_down() -> None:
 
 
 def but_long(asked: Scenario) -> tuple[str, ...]:
-    """Return what is told but for images that no access has room for."""
+    """Return the warnings other than those about images too long for any access."""
     return tuple(one for one in usual_mistakes(asked) if "takes longer than" not in one)
 
 
@@ -110,7 +110,7 @@ def test_more_data_than_all_contacts_take_is_told() -> None:
         table = compute_opportunities(question, Budget()).opportunities
         assert (table.kind == CONTACT).any()
         assert bool(mistakes_of_accesses(question, table)) is is_told
-        # At its border: what contacts take, to the percent, is what is told.
+        # With half the rate needed the warning says 50 %.
     most = float((table.end_s - table.start_s)[table.kind == CONTACT].sum())
     images = np.unique(table.site[table.kind != CONTACT])
     needed = sum(asked.targets[i].collect_s for i in images) * own.collect_fill_per_s
@@ -130,7 +130,7 @@ def test_an_image_longer_than_any_access_is_told_before_there_are_any() -> None:
         wide = replace(asked, satellites=(replace(own, sensor=sensor, resources=free),))
         table = compute_opportunities(wide, Budget()).opportunities
         lengths_s = (table.access_end_s - table.access_start_s)[table.kind != CONTACT]
-        # What was found is possible, and no warning of it; half as much again is not.
+        # No warning for the length found, which is possible; a warning for twice that.
         assert lengths_s.size > 3
         for longest_s, is_told in ((lengths_s.max(), False), (2.0 * lengths_s.max(), True)):
             targets = (replace(wide.targets[0], collect_s=float(longest_s)), *wide.targets[1:])
@@ -152,7 +152,7 @@ EUROPE = tuple(
     (lat_deg, lon_deg) for lat_deg in (45.0, 47.0, 49.0, 51.0) for lon_deg in (9, 11, 13)
 )
 AFRICA = tuple((lat_deg, lon_deg) for lat_deg in (5, 8, 11) for lon_deg in (20.0, 22.0, 24.0, 26.0))
-# Where it rains in Brazil, and off Antarctica if the columns change places.
+# In rainy Brazil; off Antarctica if the columns are swapped.
 ATLANTIC_COAST = tuple(
     (float(lat), float(lon)) for lat in (-12, -9, -6) for lon in (-62, -58, -54, -50)
 )

@@ -1,4 +1,4 @@
-"""Turns between moving lines of sight: their time, and that every method keeps to it."""
+"""Slews between moving lines of sight: their time, and that every method obeys it."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _drawn(rng: np.random.Generator, length: float) -> tuple[float, float, float
 @examples(200)
 @given(seed=SEEDS)
 def test_a_turn_can_be_flown_and_never_beats_the_rate_alone(seed: int) -> None:
-    """Fly burst, coast and burst: they cover the rotation within both limits."""
+    """Simulate burst, coast and burst: they cover the rotation within both limits."""
     rng = np.random.default_rng(seed)
     rate, acceleration = float(rng.uniform(0.5, 3.0)), float(rng.uniform(0.05, 1.0))
 
@@ -121,7 +121,7 @@ def test_pairs_and_referee_agree(seed: int) -> None:
 @examples(50)
 @given(seed=SEEDS)
 def test_turns_to_the_sun_and_back_are_those_of_the_referee(seed: int) -> None:
-    """Lines of sight move to any side here: the turn back meets them in motion."""
+    """Lines of sight move in any direction here: the slew back meets them in motion."""
     problem = sunny_problem(seed, is_moving=True, num_contacts=0)
     rng = np.random.default_rng(seed)
     shape = len(problem.opportunities), 3
@@ -162,7 +162,7 @@ def test_every_solver_turns_in_time(name: str, seed: int, use_resources: bool) -
 @pytest.mark.parametrize("solver", [Milp(), Certified()])
 @examples(60)
 @given(seed=SEEDS, use_resources=st.booleans())
-@example(seed=1621, use_resources=True)  # even an idle day takes too much of the battery
+@example(seed=1621, use_resources=True)  # even an idle day drains the battery too far
 def test_exact_solvers_find_the_best_plan(
     solver: Milp | Certified, seed: int, use_resources: bool
 ) -> None:
@@ -170,7 +170,7 @@ def test_exact_solvers_find_the_best_plan(
     best = best_reward(problem)
     solution = solver.solve(problem, Budget(), seed)
     if solution.proven is None:
-        # HiGHS says that there is no plan, and nothing of what one could earn.
+        # HiGHS finds that there is no plan, and proves no bound.
         assert isinstance(solver, Milp)
         assert not replay(problem, Plan(())).is_valid
         return
@@ -206,7 +206,7 @@ def test_rates_are_those_of_the_lines_of_sight() -> None:
     assert len(table) > 0
     rate = np.linalg.norm(table.los_rate_start, axis=1)
     assert 0.05 < rate.max() < 1.5
-    # Over a collect of 30 s the line of sight turns by about the mean of both rates.
+    # During a collect of 30 s the line of sight turns at about the mean of both rates.
     turned = np.degrees(np.arccos(np.clip(np.sum(table.los_start * table.los_end, axis=1), -1, 1)))
     mean = 0.5 * (rate + np.linalg.norm(table.los_rate_end, axis=1))
     assert turned == pytest.approx(30.0 * mean, rel=0.1, abs=0.5)

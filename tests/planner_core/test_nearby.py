@@ -1,4 +1,4 @@
-"""The part of a replan that news can touch: its answers are those of the whole."""
+"""The part of a replan that a change can affect: its answers equal those of the whole."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ URGENT = 500.0  # more than all others together
 
 
 def problem_at_random(rng: np.random.Generator, num_new: int) -> Problem:
-    """Return hours of two satellites without battery; the first targets are new and urgent."""
+    """Return hours of two satellites without batteries; the first targets are new and urgent."""
     tasks = []
     for target in range(NUM_TARGETS):
         for _ in range(rng.integers(1, 4)):
@@ -48,7 +48,7 @@ def problem_at_random(rng: np.random.Generator, num_new: int) -> Problem:
 
 
 def question_at_random(seed: int, num_new: int) -> Question:
-    """Return what to do about urgent targets after a plan of the others, of which some is lost."""
+    """Return a replan with urgent targets after a plan of the others, parts of which are lost."""
     rng = np.random.default_rng(seed)
     whole = problem_at_random(rng, num_new)
     table = whole.opportunities
@@ -126,7 +126,7 @@ def test_what_is_urgent_is_imaged_and_what_is_far_from_it_stays(seed: int, num_n
     taken = {action.opportunity for action in plan.actions}
     assert set(problem.kept_rows.tolist()) <= taken
     urgent = {row for target in range(num_new) for row in problem.collects_of(target).tolist()}
-    # Each is worth more than all that could be dropped for it, but for what is promised.
+    # Each is worth more than all that could be dropped for it, promised targets aside.
     assert taken & urgent or not urgent or question.promised
     if part is not None:
         changed = taken ^ {action.opportunity for action in start.actions}

@@ -1,4 +1,4 @@
-"""Longest paths over a skyline of labels are as heavy as those through all that may follow."""
+"""Longest paths over a skyline of labels are as heavy as those over all transitions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ WEIGHTS: Final = st.sampled_from(["equal", "random", "mostly nothing", "hardly a
 
 
 def weights(seed: int, kind: str, number: int) -> Floats:
-    """Return what tasks are worth; slow satellites pass through those of no worth too."""
+    """Return tasks' worths; slow satellites also pass through worthless tasks."""
     rng = np.random.default_rng(seed)
     if kind == "equal":
         return np.ones(number)
@@ -48,7 +48,7 @@ def weights(seed: int, kind: str, number: int) -> Floats:
 
 
 def readable(problem: Problem, worth: Floats) -> tuple[float, Floats]:
-    """Return the same as ``heaviest_through``, by trying every pair."""
+    """Return the result of ``heaviest_through``, by trying every pair."""
     total, own = 0.0, np.zeros(len(problem.satellites))
     through = np.empty(len(worth))
     for index, satellite in enumerate(problem.satellites):
@@ -67,7 +67,7 @@ def readable(problem: Problem, worth: Floats) -> tuple[float, Floats]:
 
 
 def longest(problem: Problem, worth: Floats) -> tuple[float, list[list[int]]]:
-    """Return what the heaviest paths are worth, and their rows, part by part."""
+    """Return the worth of the heaviest paths, and their rows, part by part."""
     network = network_of(problem)
     n = len(network.row)
     value, previous = np.empty(n), np.empty(n, dtype=np.int32)
@@ -99,9 +99,9 @@ def test_paths_and_detours_are_the_heaviest(
     agility: Agility,
     kind: str,
 ) -> None:
-    """In parts of the horizon as well as over it, with one collect in an access or several.
+    """Over the whole horizon and parts of it, with one collect per access or several.
 
-    With contacts among them ends do not ascend with starts.
+    With contacts, ends are not in the order of starts.
     """
     problem = random_problem(
         seed, use_resources=num_contacts > 0, num_collects=size, num_contacts=num_contacts,
@@ -129,7 +129,7 @@ def test_paths_and_detours_are_the_heaviest(
 @pytest.mark.parametrize("kind", ["equal", "random", "mostly nothing", "hardly anything"])
 @pytest.mark.parametrize("slew_rate_deg_s", [1.0, 0.1])
 def test_stored_arcs_say_the_same_of_crowds(kind: str, slew_rate_deg_s: float) -> None:
-    """Where many more labels stand than are compared; on arcs paths that remember nothing."""
+    """With far more labels than are compared; arc paths here have no memory."""
     for seed in range(4):
         problem = random_problem(
             seed, use_resources=False, num_collects=900, num_satellites=2, span_s=3000.0,

@@ -1,4 +1,4 @@
-"""Images that recorders hold at the start: they come down first, earn by that, and bounds hold."""
+"""Images recorded at the start: they are downlinked first and earn then, and bounds hold."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ OBJECTIVES = (
 
 
 def _loaded(seed: int, num_collects: int = 5) -> Problem:
-    """Return a drawn problem with images of drawn sizes on board."""
+    """Return a drawn problem with images of random sizes on board."""
     rng = np.random.default_rng(seed)
     held = float(rng.uniform(0.05, 0.45))
     problem = random_problem(
@@ -84,10 +84,10 @@ def _valid(problem: Problem) -> Iterator[Timeline]:
 
 
 @examples(60)
-@example(seed=749)  # nearly nothing can be earned: multipliers in units overflowed 32 bits
+@example(seed=749)  # almost nothing to earn: multipliers in units overflowed 32 bits
 @given(seed=SEEDS)
 def test_no_plan_earns_more_than_the_bound(seed: int) -> None:
-    """Every plan there is; of new images and of those on board."""
+    """Every possible plan, with its new images and those on board."""
     problem = _loaded(seed)
     bare = without_on_board(problem)
     solution = certified(bare, seed)
@@ -115,7 +115,7 @@ def test_no_plan_earns_more_than_the_bound(seed: int) -> None:
 
 
 def _queue(problem: Problem, plan: Plan) -> dict[int, float]:
-    """Return when each image on board is down, by pieces that are served moment by moment."""
+    """Return when each image on board is down, from a queue served in small time steps."""
     r, step_s = problem.satellites[0].resources, 0.05
     listed = sum(image.amount for image in problem.on_board)
     queue: deque[list[float]] = deque(
@@ -146,7 +146,7 @@ def _queue(problem: Problem, plan: Plan) -> dict[int, float]:
 @examples(60)
 @given(seed=SEEDS)
 def test_they_come_down_first_and_in_their_order(seed: int) -> None:
-    """Beside an integration of its own, and the formula of what that earns."""
+    """Compared with an independent integration and the formula of their worth."""
     problem = _loaded(seed, num_collects=6)
     rng = np.random.default_rng(seed)
     chosen: list[int] = []
@@ -160,7 +160,7 @@ def test_they_come_down_first_and_in_their_order(seed: int) -> None:
     earned: dict[int, float] = {}
     for one, image in zip(timeline.brought_down, problem.on_board, strict=True):
         if one.delivered_s is None:
-            # In the last moment of a contact, pieces cannot tell.
+            # In the last moment of a contact the steps are too coarse to tell.
             ends_s = [act.end_s for act in plan.actions]
             late_s = expected.get(one.image)
             assert late_s is None or any(abs(late_s - end_s) < 0.2 for end_s in ends_s)
@@ -281,7 +281,7 @@ def test_without_contacts_they_stay_on_board() -> None:
     assert (one.delivered_s, one.earned) == (None, 0.0)
     assert judged.outcomes[1].outcome == "collected"
     assert most_on_board(judged.problem) == 0.0
-    # The recorder holds what is listed where it is not said to hold more.
+    # The recorder holds the listed images unless it is said to hold more.
     assert judged.problem.satellites[0].resources.initial_recorder_fraction == 0.05
 
 

@@ -1,4 +1,4 @@
-"""Opportunities follow the plan model: where collects and contacts lie in their accesses."""
+"""Opportunities follow the plan model: the position of collects and contacts in accesses."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_spaced_collects_cover_the_access_with_both_ends(
 @given(
     start_ms=st.integers(0, 10**8),
     length_ms=st.integers(1, 600_000),
-    # In whole milliseconds: a multiple amid two of them may be rounded either way.
+    # In whole milliseconds: a multiple halfway between two may be rounded either way.
     spacing_s=st.integers(500, 400_000).map(lambda spacing_ms: spacing_ms / 1000.0),
 )
 def test_starts_aligned_to_the_horizon_are_all_its_multiples_that_fit(

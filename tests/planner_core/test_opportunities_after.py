@@ -1,4 +1,4 @@
-"""Opportunities of a scenario that follows another one: as if computed from nothing."""
+"""Opportunities derived from an earlier scenario equal those computed from scratch."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_only_what_is_new_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def base_of(scenario: Scenario) -> Replan:
-    """Return a replan after a plan of the first five targets."""
+    """Return a replan based on a plan of the first five targets."""
     start = scenario.horizon.start
     return Replan(
         base=tuple(

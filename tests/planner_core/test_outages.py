@@ -1,4 +1,4 @@
-"""Outages: no plan touches them, the best of the others is found, and reasons name them."""
+"""Outages: no plan touches them, the best remaining plan is found, and reasons name them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def drawn(seed: int, dynamics: Dynamics, *, use_resources: bool) -> Problem:
 
 
 def outages_at_random(seed: int, problem: Problem) -> tuple[Blocked, ...]:
-    """Return an outage of a satellite and one of a station, one of them or none."""
+    """Return outages of a satellite and a station: both, one of them or none."""
     rng = np.random.default_rng(seed)
     from_s = rng.uniform(0, 900, size=2)
     to_s = from_s + rng.uniform(10, 400, size=2)
@@ -58,7 +58,7 @@ def outages_at_random(seed: int, problem: Problem) -> tuple[Blocked, ...]:
 def test_plans_are_the_best_that_no_outage_touches(
     seed: int, dynamics: Dynamics, use_resources: bool
 ) -> None:
-    """Brute force goes through the whole table, and the referee alone tells it of the outages."""
+    """Brute force searches the whole table and knows the outages from the referee alone."""
     whole = drawn(seed, dynamics, use_resources=use_resources)
     pinned = Pinned(blocked=outages_at_random(seed, whole))
     problem = apply_pins(whole, pinned)

@@ -1,4 +1,4 @@
-"""Pins: every solver honours them, exact ones to the last image; impossible ones are refused."""
+"""Pins: all solvers honour them, exact ones optimally; impossible pins are refused."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ EXACT: list[Solver] = [Milp(), Milp(formulation="pairwise"), Certified()]
 
 
 def pinned_at_random(problem: Problem, seed: int, num_kept: int) -> Pinned:
-    """Return pins in terms of the whole table, possible or not."""
+    """Return pins on rows of the whole table, possible or not."""
     rng = np.random.default_rng(seed)
     table = problem.opportunities
     kept = rng.choice(len(table), size=min(num_kept, len(table)), replace=False)
@@ -82,7 +82,7 @@ def pinned_at_random(problem: Problem, seed: int, num_kept: int) -> Pinned:
 
 
 def pinned_or_refused(whole: Problem, pinned: Pinned) -> tuple[Problem, Fault | None]:
-    """Return the problem with its pins, and what is wrong with them, if anything."""
+    """Return the problem with its pins, and the fault if they are refused."""
     try:
         return apply_pins(whole, pinned), None
     except InvalidScenario as error:
@@ -114,7 +114,7 @@ def drawn(seed: int, **more: Any) -> Problem:
 def test_plans_with_pins_are_the_best_that_honour_them(
     seed: int, dynamics: Dynamics, use_resources: bool, num_satellites: int, num_kept: int
 ) -> None:
-    """Brute force goes through the whole table, and the referee alone tells it of the pins."""
+    """Brute force searches the whole table and knows the pins from the referee alone."""
     whole = drawn(
         seed, dynamics=dynamics, use_resources=use_resources, num_satellites=num_satellites
     )
@@ -127,7 +127,7 @@ def test_plans_with_pins_are_the_best_that_honour_them(
         assert (fault.pointer or "").startswith(("/pins/keep/", "/pins/skip/", "/pins/block/"))
         return
     if best is None:
-        # Two satellites may need the same antenna, which only a search can tell.
+        # Two satellites may need the same antenna, which only a search can find out.
         assert use_resources
         assert num_satellites > 1 or not has_plan(whole)
         return
@@ -153,7 +153,7 @@ def test_plans_with_pins_are_the_best_that_honour_them(
 def test_crowded_plans_keep_what_is_pinned(
     seed: int, dynamics: Dynamics, num_kept: int, use_resources: bool
 ) -> None:
-    """Also where the budget is spent at once, and the rule plans all."""
+    """Also if the budget is spent at once, so that the rule makes the whole plan."""
     whole = random_problem(
         seed, dynamics=dynamics, use_resources=use_resources, num_satellites=2,
         num_targets=20, num_collects=40, num_contacts=8, num_stations=2,
@@ -183,7 +183,7 @@ def test_a_satellite_that_turns_slower_than_it_tracks_honours_pins_too(
     pinned = pinned_at_random(whole, seed, num_kept)
     problem, fault = pinned_or_refused(whole, pinned)
     if fault is not None:
-        return  # kept actions must follow each other directly, which brute force does not ask
+        return  # kept actions must be able to follow each other directly; brute force ignores that
     best = best_plan(problem)
     if best is None:
         return
@@ -233,7 +233,7 @@ def test_contacts_ruled_out_are_refused_exactly_where_no_plan_is_left(
 def test_pins_are_refused_exactly_where_no_plan_honours_them(
     seed: int, dynamics: Dynamics, num_kept: int
 ) -> None:
-    """What is kept may exclude the contact without which a recorder is full."""
+    """Kept actions may exclude a contact without which the recorder overflows."""
     rng = np.random.default_rng(seed)
     chatty = replace(TIGHT, telemetry_per_s=float(rng.uniform(3e-4, 1.2e-3)))
     whole = random_problem(
@@ -261,7 +261,7 @@ def test_states_that_count_as_one_are_no_worse_than_each() -> None:
 
 
 def test_two_images_of_a_target_that_must_be_taken_stay() -> None:
-    """A file cannot ask for that, but a problem can."""
+    """A scenario file cannot require that, but a problem can."""
     tasks = [
         Task(kind=COLLECT, site=site, start_s=start_s, end_s=start_s + 30.0)
         for site, start_s in ((0, 100.0), (1, 200.0), (0, 300.0), (1, 400.0), (2, 500.0))

@@ -1,4 +1,4 @@
-"""Differences of plans: empty for the same, and the sums of what they name."""
+"""Differences of plans: empty for equal plans; sums match the listed changes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_a_target_imaged_at_another_time_has_moved_to_the_nearest_one() -> None:
     after = view(action("a", 300, "t"), action("c", 100), action("g", 200, "t", mode="contact"))
     diff = plan_diff(before, after)
     assert diff.moved == ((action("a", 0), action("a", 300, "t")),)
-    # Another satellite's contact is another contact.
+    # A contact of another satellite is a different contact.
     assert diff.removed == (action("b", 100), action("g", 200, mode="contact"))
     assert diff.added == (action("c", 100), action("g", 200, "t", mode="contact"))
 

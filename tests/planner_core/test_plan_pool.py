@@ -1,4 +1,4 @@
-"""Merged plans: valid, made of the plans they come from, and as good as can be made of them."""
+"""Merged plans: valid, made of the pool's plans, and the best that can be made of them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ROOMY = replace(
 
 
 def plans_of(problem: Problem, num_plans: int, num_moves: int) -> list[Plan]:
-    """Return plans that a short search ends with, from one seed after another."""
+    """Return the results of short searches with different seeds."""
     start, plans = Rule().solve(problem, Budget(), 0).plan, []
     for seed in range(num_plans):
         search = ResourceWindows(problem, seed)

@@ -60,7 +60,7 @@ def built(asked: Scenario) -> Problem:
 
 
 def test_lines_of_sight_are_those_of_the_orbit_code(problem: Problem) -> None:
-    """Far below the 1e-4 deg that a plan could notice, between nodes as at them."""
+    """To far below the 1e-4 deg that could affect a plan, both at nodes and between them."""
     pointing = problem.pointing
     assert pointing is not None
     rng = np.random.default_rng(0)
@@ -143,7 +143,7 @@ def test_earliest_and_latest_starts_suffice_and_a_moment_less_does_not(
 
 
 def test_the_referee_looks_where_a_moved_collect_looks(problem: Problem) -> None:
-    """The table's line of sight would let a satellite turn too late, or blame it for nothing."""
+    """With the table's line of sight it could accept a late slew or blame a good one."""
     table, pointing = problem.opportunities, problem.pointing
     assert pointing is not None
     checked = 0
@@ -163,18 +163,18 @@ def test_the_referee_looks_where_a_moved_collect_looks(problem: Problem) -> None
 
 
 def _accesses(table: Opportunities) -> list[tuple[float, ...]]:
-    # Of a pass there may be several contacts, which do not move.
+    # A pass may have several contacts, which do not move.
     fixed_s = np.where(table.kind == CONTACT, table.start_s, 0.0)
     columns = (table.satellite, table.kind, table.site, table.access_start_s, fixed_s)
     return list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def test_a_problem_with_other_starts_is_the_one_that_has_them_by_itself() -> None:
-    """Fixed opportunities put at a spacing's starts are those that the spacing offers."""
+    """Fixed opportunities moved to a spacing's starts equal those that the spacing offers."""
     fixed = built(scenario())
     spaced = built(scenario(collect_spacing_s=20.0))
     table, wanted = fixed.opportunities, spaced.opportunities
-    # Accesses are numbered as they come in a table.
+    # Accesses are numbered in the order of the table.
     by_access = {one: row for row, one in enumerate(_accesses(table))}
     rows = np.array([by_access[one] for one in _accesses(wanted)], dtype=np.int32)
     made = retimed(fixed, rows, wanted.start_s)

@@ -1,4 +1,4 @@
-"""What is preferred beside worth never costs any, and every aim is come nearer to."""
+"""Preferences never cost worth, and every aim gets closer."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _problem = partial(varied_problem, scarce=TIGHT)
 def alike_problem(
     seed: int, num_satellites: int = 2, num_targets: int = 12, num_offers: int = 2
 ) -> Problem:
-    """Return a problem in which images differ by angles alone, all worth the same."""
+    """Return a problem whose images are all worth the same and differ in angles alone."""
     problem = random_problem(
         seed,
         num_satellites=num_satellites,
@@ -79,7 +79,7 @@ def test_preferences_cost_no_worth_to_the_last_bit(
     assert after.timeline.reward == before.timeline.reward
     assert after.timeline.validity == before.timeline.validity
     first = aims[0]
-    # Those after it may cost it a hundredth of what it came to.
+    # Later aims may cost it a hundredth of the value it reached.
     reached = value_of(polished_for(problem, plan, first, seed), first)
     assert value_of(after, first) <= reached + 0.01 * abs(reached)
     assert reached <= value_of(before, first)
@@ -97,7 +97,7 @@ def polished_for(problem: Problem, plan: Plan, aim: Preference, seed: int) -> Vi
 def test_every_aim_is_come_nearer_to(aim: Preference) -> None:
     gained, total = 0, 0
     for seed in range(12):
-        # Where everything is tight nothing can be shifted to the other satellite.
+        # If everything is tight nothing can be moved to the other satellite.
         problem = alike_problem(seed, num_targets=6, num_offers=6)
         if aim == "balance":
             problem = replace(problem, use_resources=False)

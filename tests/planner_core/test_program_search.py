@@ -1,4 +1,4 @@
-"""Plans by programs with drawn contacts: valid, never worse, near the optimum, and repeatable."""
+"""Plans by programs with drawn contacts: valid, never worse, near the optimum, repeatable."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _problem = partial(varied_problem, scarce=STARVED)
 
 
 class Known(NamedTuple):
-    """Costs that stay as they are."""
+    """Costs that stay constant."""
 
     losses: Floats
 
@@ -133,7 +133,7 @@ def test_contacts_fixed_anew_are_worth_what_a_new_program_says(
         some = tuple(contacts[rng.random(len(contacts)) < 0.4].tolist())
         program.fix(some)
         alone = FixedContacts(problem, every, some, Budget(), 0).relaxed()
-        # Cuts of earlier sets hold for all: they may bring it below.
+        # Cuts found for earlier sets hold for all: they may make it lower.
         assert program.relaxed() <= alone + 1e-5
         plan = FixedContacts(problem, every, some, Budget(), 0).plan(0.0)
         if plan is not None and replay(problem, plan).is_valid:

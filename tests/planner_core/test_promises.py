@@ -1,4 +1,4 @@
-"""Thousands of replans: nothing promised is bumped or late, and nothing frozen ever differs."""
+"""Thousands of replans: no promise is bumped or late, and no frozen action differs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SEEDS = st.integers(0, 10**7)
 
 
 def _with_deadlines(happened: Event, seed: int) -> Question:
-    """Return the question with dates for some promises, at which they are kept as things were."""
+    """Return the question with deadlines for some promises, which the old plan would meet."""
     question, rng = happened.question, np.random.default_rng(seed)
     kept = Plan.of(question.problem, question.base.tolist())
     down_s = question.down_s(kept)
@@ -44,7 +44,7 @@ def _with_deadlines(happened: Event, seed: int) -> Question:
 @examples(2500)
 @given(seed=SEEDS)
 def test_what_is_promised_and_frozen_holds(seed: int) -> None:
-    """Most with no time at all, so that what comes first counts; some with all the time needed."""
+    """Most without any time, so that the first plan counts; some with all the time needed."""
     has_time, use_resources = seed % 25 == 0, seed % 3 > 0
     happened = event_at_random(seed, use_resources=use_resources, is_exact=False)
     if happened is None:
@@ -93,7 +93,7 @@ def _asked(problem: Problem, base: list[int], **deadline_s: float) -> Question:
 
 
 def test_a_contact_is_added_where_a_date_asks_for_it() -> None:
-    """The base brings it down with the second pass; the date is before that."""
+    """The base plan downlinks it in the second pass, after the deadline."""
     problem = _passes()
     question = _asked(problem, [0, 2, 3], t0=400.0)
     plan = solve_replan(question, Rule(), Budget(), 0).plan

@@ -1,4 +1,4 @@
-"""Every target once, and each reason true of the plan it speaks of."""
+"""Every target has one outcome, and each reason is true of the plan it explains."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def rows_of(plan: Plan) -> list[int]:
 
 
 def with_settings(problem: Problem, change: Change) -> Problem:
-    """Return the problem with a change applied, compiled anew."""
+    """Return the problem with a change applied, compiled again."""
     satellites = []
     for index, satellite in enumerate(problem.satellites):
         agility, resources = satellite.agility, satellite.resources
@@ -85,7 +85,7 @@ def judged(problem: Problem, rows: Iterable[int]) -> Timeline:
 
 
 def check_reasons(problem: Problem, plan: Plan, search: Search) -> set[str]:
-    """Hold every reason of a valid plan against the referee; return the codes that came up."""
+    """Check every reason of a valid plan with the referee; return the codes that occurred."""
     timeline = replay(problem, plan)
     outcomes = explain(problem, plan, timeline, search)
     assert [o.target for o in outcomes] == list(range(len(problem.target_ids)))
@@ -117,7 +117,7 @@ def check_reasons(problem: Problem, plan: Plan, search: Search) -> set[str]:
             assert again.is_valid
             assert again.reward - timeline.reward == pytest.approx(reason.reward_delta)
             assert reason.change is not None
-            # Nothing is dropped for nothing.
+            # No action is dropped unnecessarily.
             for p in reason.blocking:
                 assert not judged(problem, [*freed, own[p], reason.opportunity]).is_valid
         if reason.code in ("battery", "recorder") and broken <= {"battery", "recorder"}:

@@ -1,4 +1,4 @@
-"""What the referee works out for all actions at once, against loops that do it one by one."""
+"""The referee's vectorised computations, compared with loops over single actions."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SEEDS = st.integers(0, 10**6)
 
 
 def _drawn_plan(problem: Problem, rng: np.random.Generator) -> Plan:
-    """Return actions that overlap, follow each other too soon, or stand beside their window."""
+    """Return actions that overlap, follow each other too soon, or lie outside their window."""
     rows = np.flatnonzero(rng.random(len(problem.opportunities)) < rng.choice([0.2, 0.5, 0.9]))
     actions = []
     for action in Plan.of(problem, rows.tolist()).actions:

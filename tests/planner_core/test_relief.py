@@ -1,4 +1,4 @@
-"""A recorder that is too full at the start: contacts empty it, and what is proven holds."""
+"""A recorder too full at the start: contacts empty it, and proofs hold."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _full_problem(seed: int) -> Problem:
 
 
 def _flown(problem: Problem) -> Iterator[Timeline]:
-    """Yield whatever may be flown."""
+    """Yield the timeline of every plan that may be flown."""
     rows = range(len(problem.opportunities))
     for number in range(len(rows) + 1):
         for taken in combinations(rows, number):
@@ -62,7 +62,7 @@ def test_an_image_that_fills_it_further_is_to_blame() -> None:
 
 @pytest.mark.parametrize("code", ["battery", "recorder"])
 def test_an_image_without_energy_or_room_is_to_blame_though_no_level_moves(code: str) -> None:
-    """An empty battery cannot fall, nor a full recorder rise: what is asked of them is broken."""
+    """An empty battery cannot fall, nor a full recorder rise: using them is the violation."""
     battery, recorder = (0.0, 0.0) if code == "battery" else (0.9, 1.0)
     worn = replace(TIGHT, initial_battery_fraction=battery, initial_recorder_fraction=recorder)
     image = Task(kind=COLLECT, site=0, start_s=0.0, end_s=10.0)

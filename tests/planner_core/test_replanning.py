@@ -1,4 +1,4 @@
-"""Replans: nothing frozen differs, nothing promised is bumped, and bounds hold."""
+"""Replans: no frozen action differs, no promise is bumped, and bounds hold."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ BETA = Stability()
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """A plan in force, something that happens to it, and the question what to do now."""
+    """A plan in force, a change that affects it, and the question what to do now."""
 
     whole: Problem
     base: Plan
@@ -44,7 +44,7 @@ class Event:
     question: Question
 
     def rows(self, plan: Plan) -> set[int]:
-        """Return a plan in rows of the whole table."""
+        """Return a plan's actions as rows of the whole table."""
         return {self.question.problem.scenario_row(a.opportunity) for a in plan.actions}
 
 
@@ -56,9 +56,9 @@ def event_at_random(
     stability: Stability = BETA,
     is_exact: bool = True,
 ) -> Event | None:
-    """Return a plan that loses a span, is frozen to some instant and has promises.
+    """Return a plan with an outage, an instant up to which it is frozen, and promises.
 
-    Not the best one but that of the rule, where it is not to be exact.
+    If not ``is_exact``, it is the rule's plan instead of the best one.
     """
     rng = np.random.default_rng(seed)
     whole = random_problem(
@@ -87,7 +87,7 @@ def event_at_random(
     try:
         problem = apply_pins(whole, pinned)
     except InvalidScenario:
-        return None  # what is flown lies in the outage, or leaves no way to keep the limits
+        return None  # a frozen action lies in the outage, or the limits can no longer be kept
     assert problem.origin is not None
     still = np.flatnonzero(np.isin(problem.origin, taken))
     imaged = problem.opportunities.site[still[problem.opportunities.kind[still] == COLLECT]]
@@ -111,7 +111,7 @@ def test_nothing_frozen_differs_and_nothing_promised_is_bumped(
     try:
         solution = solve_replan(question, Certified() if is_exact else Rule(), Budget(), 0)
     except InvalidScenario as error:
-        # What the plan imaged and can still image is dropped for the limits alone.
+        # A target the plan imaged and can still image is dropped only because of limits.
         is_refusal = use_resources and error.fault.code == "promise_not_kept"
         if not is_refusal:
             raise
@@ -130,7 +130,7 @@ def test_nothing_frozen_differs_and_nothing_promised_is_bumped(
 @examples(100)
 @given(seed=SEEDS, use_resources=st.booleans())
 def test_no_plan_exceeds_the_bounds(seed: int, use_resources: bool) -> None:
-    """Brute force over what is left, for the reward and for the sum with the changes."""
+    """Brute force over the remaining tasks, for the reward and for the sum with the changes."""
     happened = event_at_random(seed, use_resources=use_resources)
     if happened is None:
         return
@@ -150,7 +150,7 @@ def test_no_plan_exceeds_the_bounds(seed: int, use_resources: bool) -> None:
     searched = best_plan(question.searched)
     assert searched is not None
     assert summed >= value(question, searched) - 1e-6
-    # What it earns is what a plan from scratch earns, or less by what the changes would cost.
+    # It earns what a plan from scratch earns, less at most what changes would cost.
     slack = float(question.bonus.sum())
     assert timeline.reward >= replay(problem, best).reward - slack - 1e-6
 
@@ -209,13 +209,13 @@ def test_what_is_not_asked_of_the_referee_could_not_be_worth_enough(
 
 
 def test_a_whole_day_finds_what_moves_near_the_plan_do_not() -> None:
-    """One of 60 small ones; in operation it is most (``replanning.days``)."""
+    """One of 60 small plans; in operation most of them (``replanning.days``)."""
     happened = event_at_random(22, use_resources=True, size=6)
     assert happened is not None
     question = replace(happened.question, promised=())
     problem = question.problem
     near = improved(question, first_plan(question, Budget()), Budget(), 0)
-    # The solver is one that finds nothing more.
+    # The rule finds no better plan.
     found = solve_replan(question, Rule(), Budget(), 0).plan
     assert replay(problem, found).is_valid
     assert replay(problem, found).reward > replay(problem, near).reward
@@ -349,7 +349,7 @@ def test_the_fewest_changes_are_what_brute_force_finds(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [31, 75, 110, 140, 162, 176, 185, 196, 223, 317, 351, 368])
 def test_where_the_plan_breaks_a_limit_no_plan_counts_more(seed: int) -> None:
-    """What is earned and what is kept, by brute force; contacts count nothing when kept."""
+    """Earned and kept worth, by brute force; keeping contacts counts nothing here."""
     stability = replace(BETA, contact_weight=0.0)
     happened = event_at_random(seed, use_resources=True, stability=stability)
     assert happened is not None
@@ -372,7 +372,7 @@ def test_the_multipliers_of_the_plan_before_prove_a_bound(
     question = replace(happened.question, promised=())
     problem, whole = question.problem, happened.whole
     rng = np.random.default_rng(seed)
-    # Whatever they are: of some targets nothing may be known, and what is known may be far off.
+    # Any values will do: targets may be unknown, and known values may be far off.
     ids = [name for name in whole.target_ids if rng.random() < 0.7]
     proof = quick_bound(whole, 0.0)
     some = rng.uniform(0.0, 2.0, len(ids))
@@ -436,7 +436,7 @@ def test_what_comes_in_has_the_multiplier_of_its_like_where_energy_is_short(
 
 
 def test_replans_one_after_the_other_do_not_count_in_ever_smaller_units() -> None:
-    """Each with a target more: at a unit halved each time labels would double each time."""
+    """Each with one more target: if the unit halved each time, labels would double each time."""
     whole = random_problem(0, num_targets=9, num_collects=12)
     unit = 1.0
     for number in range(3, 9):

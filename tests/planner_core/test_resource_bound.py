@@ -1,4 +1,4 @@
-"""The bound under battery and recorder holds for every plan, and is tight where it can be."""
+"""The bound under battery and recorder holds for every plan, and is tight if it can be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A satellite's network is made once, and is still that of the problem at hand."""
+"""A satellite's network is built once, and still fits the problem at hand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.planner_core.problems import TIGHT, varied_problem
 
 
 def variants(problem: Problem) -> list[Problem]:
-    """Return problems of the same satellites."""
+    """Return different problems of the same satellites."""
     other: Dynamics = "paper" if problem.dynamics == "physical" else "physical"
     kept = tuple(Kept(row=row, pointer=f"/pins/keep/{row}") for row in (1, 3))
     delivered = with_objective(problem, Objective.delivered())

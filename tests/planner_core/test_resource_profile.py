@@ -1,4 +1,4 @@
-"""The referee's integration: compiled, and step by step as it is written."""
+"""The referee's integration: the compiled kernel, compared with its plain Python."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_compiled_states_are_those_of_the_steps(
     assert found[:, 0].tolist() == sorted(found[:, 0])
     assert (found[:, 1:3] >= 0.0).all()
     assert (found[:, 1:3] <= 1.0).all()
-    # What was recorded is on the ground, on board or lost where the recorder was full.
+    # All recorded data is downlinked, on board, or lost because the recorder was full.
     lost = found[-1, 3] - found[-1, 4] - found[-1, 2]
     assert lost >= -1e-9 * max(1.0, found[-1, 3])
 
@@ -80,7 +80,7 @@ def test_levels_at_the_start_may_be_whole_numbers() -> None:
     )
     profiles = [integrate(p, p.satellites[0], Plan()) for p in (whole, real)]
     np.testing.assert_array_equal(profiles[0].curve, profiles[1].curve)
-    # Kernels are compiled for what they are given: of the same types once.
+    # Kernels are compiled per argument type: the same types compile once.
     tracks = [
         compile_track(p, p.satellites[0], np.zeros(len(p.satellites[0]), dtype=np.uint8))
         for p in (whole, real)

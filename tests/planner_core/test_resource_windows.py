@@ -1,4 +1,4 @@
-"""Plans under battery and recorder by windows: valid, never worse, and near the optimum."""
+"""Window search under battery and recorder: plans valid, never worse, and near the optimum."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_noise_leads_further_where_images_differ_in_worth() -> None:
         one.adopt(start)
         other.adopt(start)
         other.anneal(200, Budget())
-        for _ in range(TUNING.rounds):  # as many moves
+        for _ in range(TUNING.rounds):  # the same number of moves
             one.make_moves_on_each(200, Budget())
         plain, noisy = plain + one.reward, noisy + other.reward
     assert noisy > 1.005 * plain

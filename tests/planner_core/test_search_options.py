@@ -1,4 +1,4 @@
-"""The searches' options: what the paper says, what the authors' code does, what A(s) holds."""
+"""The searches' options: by the paper's text, by the authors' code, and by A(s)."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_the_actions_of_a_state_are_of_different_accesses_in_model_and_tree(
 
 
 def test_breadth_counts_targets_and_not_the_collects_that_one_access_offers() -> None:
-    """Three offers of a poor target come before a rich one that they exclude."""
+    """Three offers of a poor target precede a rich one that they exclude."""
     offers = [
         Task(kind=COLLECT, site=0, start_s=100.0 + k, end_s=130.0 + k, access=0) for k in range(3)
     ]
@@ -91,13 +91,13 @@ def test_breadth_counts_targets_and_not_the_collects_that_one_access_offers() ->
 
 
 def test_the_codes_rule_collects_until_the_recorder_is_half_full_and_no_further() -> None:
-    """The text stops before its limit of half full is crossed; the code crosses it once."""
+    """The text stops before crossing its limit of half full; the code crosses it once."""
     tasks = [Task(kind=COLLECT, site=i, start_s=100.0 * i, end_s=100.0 * i + 30) for i in range(6)]
     problem = make_problem(tasks, num_targets=6)
     text = Rule(feasibility="penalty")
     assert rows_of(problem, text) == [0, 1]
     assert rows_of(problem, replace(text, thresholds="code")) == [0, 1, 2]
-    # The limits of the plan model come on top unless they are only a penalty.
+    # The plan model's limits also apply unless they are only a penalty.
     assert rows_of(problem, Rule(thresholds="code")) == [0, 1]
 
 
@@ -114,7 +114,7 @@ def test_one_more_task_is_breadth_plus_one(solver: ForwardSearch | Mcts) -> None
 
 
 def test_the_codes_discount_reaches_to_the_next_action() -> None:
-    """A late second image then counts less, so that a rich first one is preferred to two.
+    """A late second image counts less, so that a rich first one beats two.
 
     Value of 0 then 2: 0.9**10 (1 + x), with x = 0.9**40 to 2's start by the code and 1 by the
     paper, each times 2's own R = 0.9**40 * 50; value of 1, which excludes 2: 0.9**20 * 3.
@@ -181,7 +181,7 @@ def test_a_contact_may_count_by_the_wait_for_it(make: Any) -> None:
 
 @pytest.mark.parametrize("make", [ForwardSearch, Mcts], ids=["forward_search", "mcts"])
 def test_an_image_may_need_limits_to_count_as_made(make: Any) -> None:
-    """The battery is at its end: by the text the target is still to be imaged, and is again."""
+    """The battery is exhausted: by the text the target is still unimaged, and is taken again."""
     flat = replace(TIGHT, initial_battery_fraction=0.31, sunpoint_charge_per_s=0.0)
     tasks = [Task(kind=COLLECT, site=0, start_s=t, end_s=t + 30.0) for t in (100.0, 300.0)]
     problem = make_problem(tasks, num_targets=1, resources=flat)

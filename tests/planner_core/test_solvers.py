@@ -1,4 +1,4 @@
-"""Every solver, over generated problems: valid, deterministic, never above brute force."""
+"""Every solver on generated problems: valid, deterministic, never above brute force."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_plans_are_valid_and_the_same_every_time(
 def test_hard_plans_look_ahead_so_that_telemetry_never_fills_the_recorder(
     seed: int, dynamics: Dynamics, telemetry_per_s: float
 ) -> None:
-    """Where the contacts alone can keep the limits, every solver's plan keeps them."""
+    """If contacts alone can keep the limits, every solver's plan keeps them."""
     resources = replace(TIGHT, telemetry_per_s=telemetry_per_s)
     problem = problems(
         seed, dynamics, True, num_collects=25, num_targets=20, num_contacts=8, resources=resources
@@ -273,7 +273,7 @@ def test_mcts_follows_its_seed_and_nothing_else() -> None:
 
 
 def test_an_action_without_its_own_reward_loses_images() -> None:
-    """Line 14 of Alg. 2 taken literally leaves the reward of the first action out."""
+    """Line 14 of Alg. 2 taken literally omits the reward of the first action."""
     literal = replace(PAPER_MCTS, returns="literal", num_simulations=200, window_moves_per_task=0.0)
     whole = replace(literal, returns="with_reward")
     totals = {literal: 0.0, whole: 0.0}

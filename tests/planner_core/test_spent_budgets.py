@@ -1,4 +1,4 @@
-"""Whenever its time is over, a search ends with a valid plan and a bound above it."""
+"""Whenever a search's time is over, it ends with a valid plan and a bound above it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _STOPS: Final = 7
 
 
 class CountingBudget(Budget):
-    """Is spent when it has been asked so often; then kernels stop too."""
+    """A budget that is spent after this many checks; then kernels stop too."""
 
     def __init__(self, checks: int | None) -> None:
         super().__init__()
@@ -51,7 +51,7 @@ class CountingBudget(Budget):
         return super().is_spent()
 
     def stops(self) -> list[int]:
-        """Return after how many checks to stop: at first, about each report, and between them."""
+        """Return how many checks to stop after: the first few, around reports, evenly between."""
         reports = np.array(self.told_after)[:: max(1, len(self.told_after) // _STOPS)]
         evenly = np.linspace(_FIRST, self.num_checks, _STOPS, dtype=np.int64)
         every = np.concatenate([np.arange(_FIRST), reports, reports + 1, evenly])
@@ -59,7 +59,7 @@ class CountingBudget(Budget):
 
 
 def _pinned() -> Problem:
-    """Return a problem in which HiGHS has to plan around what is pinned."""
+    """Return a problem in which HiGHS has to plan around pins."""
     problem = random_problem(4, num_collects=60, num_targets=30, use_resources=False,
                              max_turn_deg=60.0, has_rewards=True, agility=SLOW)  # fmt: skip
     assert not is_transitive(problem)
@@ -120,7 +120,7 @@ def _stop_at_each_stage(problem: Problem) -> None:
         timeline = replay(problem, solution.plan)
         assert timeline.is_valid, checks
         assert solution.bound is None or solution.bound >= timeline.reward - 1e-9, checks
-        # Where HiGHS searches the number of checks is a matter of time: this run may have ended
-        # before. To ask the budget would be one check more, and could spend it only now.
+        # With HiGHS the number of checks depends on timing: this run may have ended earlier.
+        # Calling ``is_spent`` here would be one more check and could spend the budget only now.
         if budget.stop[0]:
             assert solution.termination in (Termination.TIME_LIMIT, Termination.OPTIMAL), checks

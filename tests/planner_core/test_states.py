@@ -1,4 +1,4 @@
-"""States before the horizon: carried to its start as the referee would, and planned from there."""
+"""States before the horizon: carried to its start as by the referee, and planned from there."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _later(before_s: float, duration_h: float = 3.0) -> Horizon:
 def test_a_state_is_carried_as_the_referee_lets_a_satellite_idle(
     before_s: float, sun_pointing: SunPointing, *, is_eclipse_aware: bool
 ) -> None:
-    """An idle satellite is followed from the state on, past the start of the other horizon."""
+    """An idle satellite is followed from the state on, past the start of the later horizon."""
     known = replace(
         IDLE, initial_battery_fraction=0.4, initial_recorder_fraction=0.5,
         sun_pointing=sun_pointing, eclipse_aware=is_eclipse_aware,
@@ -98,7 +98,7 @@ def test_what_a_state_does_not_say_the_resources_say() -> None:
 def test_a_battery_stops_where_it_is_full_or_empty(
     battery: float, charge_per_s: float, idle_per_s: float, edges_s: list[int]
 ) -> None:
-    """Beside steps of a second, which the edges of sunlight fall on."""
+    """Compared with steps of one second, on which all sunlight edges lie."""
     edges = np.sort(np.array(edges_s[: len(edges_s) // 2 * 2], dtype=np.float64))
     lit = Sunlight(enter_s=edges[::2], exit_s=edges[1::2])
     resources = replace(IDLE, sunpoint_charge_per_s=charge_per_s, idle_drain_per_s=idle_per_s)
@@ -112,7 +112,7 @@ def test_a_battery_stops_where_it_is_full_or_empty(
 
 @pytest.mark.parametrize("battery", [0.1, 0.32, 0.6])
 def test_plans_begin_with_what_is_there(battery: float) -> None:
-    """Those of the paper's satellite, which may take less the emptier it is; and the proofs."""
+    """For the paper's satellite, which may do less the emptier its battery is; proofs too."""
     paper = Resources.paper(5668.7)
     begin = hours(1).start
     rewards = []

@@ -1,4 +1,4 @@
-"""AOS and LOS are those of contacts; TCA and conflicts against plain searches."""
+"""AOS and LOS equal those of contacts; TCA and conflicts are compared with plain searches."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STATIONS = (
 ORBITS = (
     PAPER_ORBIT,
     PAPER_ORBIT | {"NORAD_CAT_ID": 2, "INCLINATION": 51.6, "MEAN_MOTION": 14.5},
-    # Twelve hours round an eccentric orbit: one window may hold more than one rise.
+    # An eccentric orbit of twelve hours: the elevation may rise more than once in one window.
     PAPER_ORBIT
     | {"NORAD_CAT_ID": 3, "INCLINATION": 63.4, "MEAN_MOTION": 2.0056, "ECCENTRICITY": 0.72},
 )

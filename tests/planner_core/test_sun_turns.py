@@ -1,4 +1,4 @@
-"""Turns to the sun: what is charged, what every method makes of it, and that bounds hold."""
+"""Turns to the sun: how much they charge, that all methods agree, and that bounds hold."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SLEWING = replace(TIGHT, sun_pointing="slew")
 
 
 def _drawn_plan(problem: Problem, seed: int) -> Plan:
-    """Return a plan that satellites can turn for, whatever their batteries say."""
+    """Return a plan in which all slews fit, ignoring batteries."""
     rng = np.random.default_rng(seed)
     chosen: list[int] = []
     for own in problem.satellites:
@@ -56,7 +56,7 @@ def _drawn_plan(problem: Problem, seed: int) -> Plan:
 
 
 def _second_by_second(problem: Problem, timeline: Timeline, step_s: float) -> np.ndarray:
-    """Return the battery at every step, from what the timeline says is done when."""
+    """Return the battery at every step, from the modes that the timeline states."""
     satellite = problem.satellites[0]
     r, light = satellite.resources, satellite.sunlight
     num_steps = round(problem.horizon_s / step_s)
@@ -89,7 +89,7 @@ def test_the_referee_agrees_with_an_integration_step_by_step(seed: int) -> None:
     line = timeline.satellites[0].resources
     assert line is not None
     known = np.interp(np.arange(len(battery)) * step_s, line.time_s, line.battery)
-    # A mode changes within a step at most once for each of some 40 edges.
+    # A mode changes within a step at most once at each of some 40 edges.
     assert np.abs(known - battery).max() < 40 * step_s * (1 / 200 + 1 / 300)
     by_mode = [a for a in timeline.satellites[0].actions if a.mode == "sunpoint"]
     for action in by_mode:
@@ -167,13 +167,13 @@ def test_a_load_at_all_times_empties_the_battery_in_shadow() -> None:
     drawn = replace(TIGHT, idle_drain_per_s=1e-3, initial_battery_fraction=0.55)
     light = make_problem([], num_targets=1, resources=drawn)
     assert replay(light, Plan(())).battery_min == pytest.approx(0.0)
-    # Charged by 1/2500 - 1e-3 each second, it meets its limit after 250 / 0.6 seconds.
+    # The net rate is 1/2500 - 1e-3 per second, so the 0.25 above the limit last 0.25 / 0.0006 s.
     broken = replay(light, Plan(())).violations
     assert [v.code for v in broken] == ["battery"]
     assert broken[0].at_s == pytest.approx(0.25 / (1e-3 - 1 / 2500))
 
 
-# The turn to an image that is left out would begin after the one to the next.
+# The slew to an image left out would begin after the slew to the next one.
 @example(seed=248, num_satellites=1)
 @examples(300)
 @given(seed=SEEDS, num_satellites=st.integers(1, 3))
@@ -187,7 +187,7 @@ def test_no_plan_beats_the_bounds(seed: int, num_satellites: int) -> None:
     assert resource_value(problem, prices, 0.05) >= best - 1e-6
     assert resource_value(problem, np.zeros(len(prices)), 1.0) >= best - 1e-6
     if replay(problem, Plan(())).is_valid:
-        # Where idle load alone empties the battery HiGHS has no plan to bound.
+        # If the idle load alone empties the battery HiGHS has no plan to bound.
         assert relaxation_bound(problem, Budget(), 0).value >= best - 1e-6
 
 
@@ -232,7 +232,7 @@ def test_exact_solvers_find_the_best_plan(
     best = best_reward(problem)
     solution = solver.solve(problem, Budget(), seed)
     is_possible = replay(problem, Plan(())).is_valid
-    # Where idle load alone empties the battery no plan is valid, and HiGHS has none to bound.
+    # If the idle load alone empties the battery no plan is valid, and HiGHS has none to bound.
     assert solution.proven is not None or not is_possible
     assert solution.proven is None or solution.proven.value >= best - 1e-6
     if is_possible:
@@ -273,7 +273,7 @@ def test_turns_take_acceleration_and_settling() -> None:
 @examples(100)
 @given(seed=SEEDS)
 def test_energy_paid_for_is_what_the_satellite_lacks_back_at_the_sun(seed: int) -> None:
-    """Two tasks and a stay at the sun against the first task and that stay, far from full."""
+    """Two tasks with a stay at the sun against the first task with that stay, far from full."""
     problem = sunny_problem(seed)
     own = problem.satellites[0]
     track = compile_track(problem, own, np.zeros(len(own), dtype=np.uint8))
@@ -290,7 +290,7 @@ def test_energy_paid_for_is_what_the_satellite_lacks_back_at_the_sun(seed: int) 
 
 
 def _batches() -> Problem:
-    """Return four passes over three images each, of which a battery pays for one pass in two."""
+    """Return four passes over three images each; the battery suffices for every other pass."""
     tasks = [
         Task(kind=COLLECT, site=3 * p + k, start_s=1000.0 * p + 300 + 60 * k,
              end_s=1000.0 * p + 330 + 60 * k)

@@ -1,4 +1,4 @@
-"""The referee against hand-worked plans: what each rule of the plan model means."""
+"""The referee against hand-worked plans: the meaning of each rule of the plan model."""
 
 from __future__ import annotations
 
@@ -215,7 +215,7 @@ def test_there_is_no_idle_time_between_tasks_that_follow_at_once() -> None:
 
 
 def test_an_image_is_downlinked_only_once_everything_before_it_is_down() -> None:
-    # 0.1 + telemetry lie in the recorder before the image: a 70 s contact takes 0.28.
+    # 0.1 + telemetry are in the recorder before the image: a 70 s contact downlinks 0.28.
     image, long, short = collect(0, 0.0), contact(100.0, 170.0), contact(100.0, 150.0)
     needed = 0.1 + 30e-4 + 30 / 200
     assert 50 / 250 < needed < 70 / 250
@@ -307,7 +307,7 @@ def test_the_plan_hash_tells_plans_apart_and_ignores_the_order_of_actions() -> N
     plan = Plan.of(problem, [0, 1])
     assert plan_sha256(problem, plan) == plan_sha256(problem, Plan(plan.actions[::-1]))
     assert plan_sha256(problem, plan) != plan_sha256(problem, Plan.of(problem, [0]))
-    # 1.001 s are 1000.9999999999999 ms in floating point, and a thousand and one in a plan.
+    # 1.001 s are 1000.9999999999999 ms in floating point, but must be 1001 ms in a plan.
     plan, later, earlier = (Plan((Action(s, s + 30.0, 0),)) for s in (1.001, 1.0014, 1.0))
     assert plan_sha256(problem, plan) == plan_sha256(problem, later)
     assert plan_sha256(problem, plan) != plan_sha256(problem, earlier)

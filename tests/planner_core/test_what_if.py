@@ -1,4 +1,4 @@
-"""Pins, what-if and explanations on a real mission, judged through the whole core."""
+"""Pins, what-if and explanations on a real mission, tested through the whole core."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def view_of(plan: Judged) -> PlanView:
 @pytest.mark.parametrize("dynamics", ["physical", "paper"])
 @pytest.mark.parametrize("solver", sorted(SOLVERS))
 def test_every_solver_keeps_what_a_mission_pins(solver: str, dynamics: Dynamics) -> None:
-    """A contact booked in whole seconds, an image left out so far, an hour without images."""
+    """A contact booked in whole seconds, an image left out before, an hour without images."""
     plan = base(dynamics)
     contact = next(a for a in actions_of(plan) if a.mode == "contact")
     left_out = next(
@@ -140,7 +140,7 @@ def test_every_solver_keeps_what_a_mission_pins(solver: str, dynamics: Dynamics)
             if a.mode == "collect" and quiet_s - 30.0 < a.start_s < quiet_s + 3600.0
         ]  # fmt: skip
     assert pinned.bound is None or pinned.bound.value >= pinned.timeline.reward
-    # Opportunities are still called what the scenario calls them.
+    # Opportunities still have the names of the scenario.
     for action in actions_of(pinned):
         assert action.opportunity is not None
         row = pinned.problem.scenario_row(action.opportunity)
@@ -198,7 +198,7 @@ def test_images_that_the_battery_cannot_bear_are_refused_at_the_first_of_them() 
     )
     with pytest.raises(InvalidScenario, match="battery reaches") as refused:
         build_problem(scenario, computed(), Budget())
-    # 12 % each, and 70 % to spare.
+    # 12 % each, and 70 % available.
     assert refused.value.code == "pin_breaks_limits"
     assert refused.value.fault.pointer == "/pins/keep/5"
 
@@ -260,7 +260,7 @@ def test_settings_are_relaxed_by_name() -> None:
 
 
 def test_what_the_reasons_state_plans_come_to() -> None:
-    """A stated change of settings, applied to the scenario, lets the very target in."""
+    """A stated change of settings, applied to the scenario, lets that target in."""
     plan = base()
     tried = set()
     for outcome in plan.outcomes:
@@ -338,7 +338,7 @@ def test_what_is_said_to_give_access_does(why: int) -> None:
 
 
 def test_pins_of_an_optimal_plan_change_nothing() -> None:
-    """All actions of a plan pinned, the same plan comes out, of whatever solver."""
+    """With all actions of a plan pinned, every solver returns the same plan."""
     small = replace(mission(), targets=mission().targets[:25])
     plan = judged(small, Milp())
     pins = Pins(

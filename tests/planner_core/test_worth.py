@@ -1,4 +1,4 @@
-"""Worth and quality: curves over angles, what collects of a scenario earn by them, refusals."""
+"""Worth and quality: curves over angles, the resulting worth of collects, refusals."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_rewards_have_a_common_unit_as_far_as_doubles_count_by_ones() -> None:
     most = 2.0**50
     assert common_unit(np.array([0.0, most - 2.0])) == most - 2.0
     assert common_unit(np.array([2.0, most])) == 0.0
-    # Nothing at all is a multiple of anything, which 0 would deny.
+    # Zero rewards are multiples of anything; a unit of 0 would deny that.
     assert common_unit(np.zeros(2)) == common_unit(np.empty(0)) == 1.0
 
 

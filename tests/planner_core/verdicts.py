@@ -1,4 +1,4 @@
-"""What holds of any plan and any bound, whatever mission they are of."""
+"""Checks that hold for any plan and bound of any mission."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from planner_core.solvers.base import Solution
 HASTY: Final = {
     "tries": 1, "several": 2, "patience": 1, "rounds": 4, "epochs": 20, "many_epochs": 10,
 }  # fmt: skip
-"""Constants by which searches give up early: a small problem takes a third of the time.
+"""Constants that make searches give up early: a small problem takes a third of the time.
 
-What is proven must hold whatever they are.
+Proofs must hold with any constants.
 """
 
 
@@ -35,7 +35,7 @@ def encloses(problem: Problem, best: float, draw: int = 0) -> bool:
     Parameters
     ----------
     draw
-        The number of the problem, which decides about the constants of the search.
+    The number of the problem, which selects the constants of the search.
     """
     solution = certified(problem, draw)
     timeline = replay(problem, solution.plan, in_detail=False)
@@ -44,14 +44,14 @@ def encloses(problem: Problem, best: float, draw: int = 0) -> bool:
     assert timeline.is_valid
     assert timeline.reward <= best + 1e-6
     if solution.termination == Termination.OPTIMAL:
-        # Below ``LEAST_BOUND`` the solver takes any plan for the best.
+        # Below ``LEAST_BOUND`` the solver calls any plan the best.
         assert timeline.reward == pytest.approx(best, rel=1e-6, abs=1e-9)
     return timeline.reward >= best - 1e-6
 
 
 def require_accepted(solver: str, timeline: Timeline) -> None:
     """Check that the referee accepts the plan of a solver."""
-    if solver == "graph":  # which knows no limits
+    if solver == "graph":  # which ignores limits
         assert all(v.code in ("battery", "recorder", "duplicate") for v in timeline.violations)
     else:
         assert timeline.is_valid

@@ -1,6 +1,6 @@
 """Every window and no other, against a brute force on Skyfield's positions.
 
-The targets are real Landsat scene centres; orbits of every regime; both verticals. Windows
+The targets are real Landsat scene centres; orbits of all regimes; both verticals. Windows
 and gaps of 0.02 s and longer must agree one to one; edges of windows of 20 s and longer to
 2 ms (99 of 100) and 10 ms (all).
 """
@@ -165,7 +165,7 @@ def test_generated_orbits_and_limits(
 
 
 def test_grazing_passes_between_two_nodes_are_found_by_name() -> None:
-    """Targets just inside the reach of one pass: windows of seconds between minutes."""
+    """Targets just inside the reach of one pass: windows of seconds, nodes minutes apart."""
     elements, day = orbit(), hours(24)
     path = propagate(satellite(elements), day)
     wide = Sensor(off_nadir_min_deg=0.0, off_nadir_max_deg=89.0)

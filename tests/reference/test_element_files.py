@@ -57,7 +57,7 @@ def test_catalogues_import_completely_and_fly_as_python_sgp4_has_them(
         theirs = Satrec.twoline2rv(*entry.orbit["tle"])
         instant = theirs.jdsatepoch, theirs.jdsatepochF
         ours_km = positions_km(satrec(mean_elements(entry.elements)), *instant)
-        # The same numbers go through the same code, so nothing may differ at all.
+        # The same numbers go through the same code, so the results must be identical.
         np.testing.assert_array_equal(ours_km, positions_km(theirs, *instant))
 
 

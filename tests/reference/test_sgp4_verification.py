@@ -1,6 +1,6 @@
 """The verification set of "Revisiting Spacetrack Report #3" (Vallado, AIAA 2006-6753).
 
-Its element sets go in as a user's file would, its output is the reference.
+Its element sets are read like a user's file; its output is the reference.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from planner_core.orbits.ingest import read_elements
 from planner_core.orbits.sgp4_record import satrec
 from planner_core.orbits.tle import checksum
 
-# The reference prints 1e-8 km; its last digit and another compiler are all that may differ.
+# The reference prints 1e-8 km; only its last digit and another compiler may cause differences.
 TOLERANCE_KM = 1e-6
 WRONG_CHECKSUMS = {"33333", "33334", "33335"}  # invented by the authors to provoke errors
 ALREADY_FAILED = {"33334"}  # its one printed line repeats the last state of the set before

@@ -42,7 +42,7 @@ def _unit(lat_deg: Floats, lon_deg: Floats) -> Floats:
 
 
 def _nearest_m(places_deg: Floats, lat_deg: Floats, lon_deg: Floats) -> Floats:
-    """Return the distance from each place to the nearest of the other points."""
+    """Return the distance from each site to the nearest of the other points."""
     centers = _unit(lat_deg, lon_deg)
     sites = _unit(places_deg[:, 0], places_deg[:, 1])
     nearest: npt.NDArray[np.intp] = np.array([int((centers @ site).argmax()) for site in sites])
@@ -58,7 +58,7 @@ def test_every_real_center_is_a_point_of_the_computed_grid(real_centers_deg: Flo
 
 
 def test_shipped_scenes_hold_nearly_all_real_centers(real_centers_deg: Floats) -> None:
-    """The rest lies on open water: reefs, sea ice and calibration sites far from any shore."""
+    """The others lie on open water: reefs, sea ice and calibration sites far from any shore."""
     shipped = load_wrs2_land()
     lat_deg = np.array([scene.lat_deg for scene in shipped])
     lon_deg = np.array([scene.lon_deg for scene in shipped])

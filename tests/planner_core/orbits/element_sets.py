@@ -58,13 +58,13 @@ def omm(**changes: object) -> dict[str, object]:
 
 
 def with_checksum(line: str) -> str:
-    """Return the first 68 columns with their checksum, counted here on its own."""
+    """Return the first 68 columns with their checksum, computed independently."""
     minus_as_one = line[:68].replace("-", "1")
     return line[:68] + str(sum(int(c) for c in minus_as_one if c in "0123456789") % 10)
 
 
 def put(line: str, column: int, text: str) -> str:
-    """Return the line with ``text`` from a column on (counted from 1), checksum made right."""
+    """Return the line with ``text`` put at a column (counted from 1) and a new checksum."""
     at = column - 1
     return with_checksum(line[:at] + text + line[at + len(text) :])
 

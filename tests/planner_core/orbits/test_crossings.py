@@ -1,4 +1,4 @@
-"""The compiled limits against the plain geometry, and their rates against differences."""
+"""The compiled limits against the plain geometry, and their rates against finite differences."""
 
 from __future__ import annotations
 

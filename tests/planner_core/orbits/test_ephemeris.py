@@ -36,7 +36,7 @@ def test_positions_between_nodes_follow_sgp4(elements: OrbitElements, within_m: 
 
 @pytest.mark.parametrize("year", [2001, 2012, 2019, 2024])
 def test_earth_fixed_positions_agree_with_skyfield(year: int) -> None:
-    """Within a metre, its own precession, nutation and UT1 included."""
+    """Within a metre, including its own precession, nutation and UT1."""
     start = datetime(year, 3, 1, tzinfo=UTC)
     elements = orbit(epoch=start)
     path = propagate(satellite(elements), hours(24, start))

@@ -1,4 +1,4 @@
-"""Frames agree with published numbers and with themselves."""
+"""Frames agree with published numbers and with each other."""
 
 from __future__ import annotations
 

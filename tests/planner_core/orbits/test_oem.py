@@ -1,4 +1,4 @@
-"""Ephemerides: made of SGP4's own states they have to give SGP4's positions and accesses."""
+"""Ephemerides made from SGP4's own states must give SGP4's positions and accesses."""
 
 from __future__ import annotations
 
@@ -81,14 +81,14 @@ def satellite(orbit: OrbitEphemeris) -> Satellite:
 
 
 def apart_m(message: Sequence[str], horizon: Horizon = HORIZON) -> float:
-    """Return how far a message is from SGP4 at most."""
+    """Return the largest distance between a message and SGP4."""
     own = propagate(SCENARIO.satellites[0], horizon).position_itrf_m
     return float(np.linalg.norm(path_of(message, horizon) - own, axis=1).max())
 
 
 @pytest.mark.parametrize(
     ("interpolation", "degree", "limit_m"),
-    # SGP4's velocity is not quite the rate of its position, which HERMITE has to believe.
+    # SGP4's velocity is not quite the derivative of its position, but HERMITE relies on it.
     [("HERMITE", "7", 0.5), ("HERMITE", "3", 1.0), ("LAGRANGE", "9", 1e-3), ("", "", 0.5)],
 )
 def test_between_states_positions_are_those_of_sgp4(
@@ -109,7 +109,7 @@ def test_straight_lines_are_as_far_off_as_they_must_be() -> None:
 def test_inertial_frames_agree_with_skyfield(frame: str, limit_m: float) -> None:
     instants = [HORIZON.start + timedelta(seconds=s) for s in OFFSETS_S.tolist()]
     rotation = TEME.rotation_at(load.timescale(builtin=True).from_datetimes(instants))
-    # Skyfield's TEME is turned from the ICRS; the frame bias of J2000 by Chapront (2002).
+    # Skyfield's TEME is rotated from the ICRS; J2000's frame bias is from Chapront (2002).
     position, velocity = (np.einsum("jin,nj->ni", rotation, v) for v in states())
     if frame == "EME2000":
         eta, xi, alpha = np.array([-6.8192, -16.617, -14.6]) * 1e-3 * frames.ARCSEC_RAD

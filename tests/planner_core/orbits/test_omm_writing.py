@@ -1,4 +1,4 @@
-"""Messages written, then read back by us and by python-sgp4."""
+"""Messages that we write, read back by us and by python-sgp4."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def outgoing(*elements: OrbitElements) -> list[Outgoing]:
 
 
 def without_unknown(elements: OrbitElements) -> OrbitElements:
-    """Return what is left of an element set whose blanks were written as a word."""
+    """Return the element set without the word that is written for blanks."""
     return replace(
         elements,
         name=None if elements.name == "UNKNOWN" else elements.name,
@@ -70,7 +70,7 @@ def test_a_file_holds_many(write: object, media_type: str) -> None:
 
 
 def same_orbit(fields: dict[str, str]) -> bool:
-    """Return whether python-sgp4 makes the record of these keywords that we make."""
+    """Return whether python-sgp4 reads these keywords into the same record as we do."""
     theirs, ours = Satrec(), satrec(NAMED)
     reference.initialize(theirs, fields)
     at = (2459807.5, 0.75)

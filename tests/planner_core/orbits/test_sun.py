@@ -45,7 +45,7 @@ def test_shadow_is_a_cylinder_behind_the_earth() -> None:
 
 @pytest.mark.parametrize("case", ["case_0001", "case_0002"])
 def test_sunlit_windows_are_those_of_skyfield(shared_data: Path, case: str) -> None:
-    """Every window, its edges to 3 s: the reference is printed to whole seconds."""
+    """Every window, its edges to 3 s: the reference is given in whole seconds."""
     folder = shared_data / "refs/skyfield" / case
     lines = iter((folder / "satellites.yaml").read_text().splitlines())
     start = datetime(2025, 7, 17, 12, tzinfo=UTC)
@@ -88,7 +88,7 @@ def test_sunlight_and_shadow_agree_at_every_instant() -> None:
 
 
 def test_an_orbit_that_only_grazes_the_shadow_keeps_its_short_eclipse() -> None:
-    """Between an orbit with an eclipse and one without lie eclipses of seconds."""
+    """Between an orbit with an eclipse and one without, some orbit has an eclipse of seconds."""
 
     def eclipses(raan_deg: float) -> Floats:
         lit = sunlight(

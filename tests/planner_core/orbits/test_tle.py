@@ -124,7 +124,7 @@ def test_blanks_in_one_line_forgive_nothing_in_the_other() -> None:
 
 
 def test_blanks_that_the_format_has_forgive_nothing() -> None:
-    """Angles, revolution and element set numbers are padded with blanks by every catalogue."""
+    """All catalogues pad angles, revolution and element set numbers with blanks."""
     line_2 = put(LINE_2, 9, "  8.2000")
     assert fault_of(LINE_1, line_2[:68] + "X") == ("tle_checksum", "/tle/1")
 
