@@ -1,8 +1,8 @@
-"""How long the access search takes, beside a peer (``python -m benchmarks.access``).
+"""How long the access search takes, and a peer's (``python -m benchmarks.access``).
 
-The peer is brahe at its default step of 60 s, where it is installed (the extra ``peers``);
-both are timed in one run, so the ratios mean more than the times. Window counts tell what
-each finds: a step of 60 s loses grazing passes and joins the two halves of an overhead one.
+The peer is brahe at its default step of 60 s, if it is installed (the extra ``peers``); both are
+timed in one run, so the ratios mean more than the times. Window counts tell what each finds: a
+step of 60 s misses grazing passes and joins the two halves of an overhead pass.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ START = datetime(2019, 1, 1, tzinfo=UTC)
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """Satellites, targets and how long to look."""
+    """Satellites, targets and the time span."""
 
     name: str
     satellites: tuple[Satellite, ...]
@@ -68,7 +68,7 @@ def satellite(sensor: Sensor, **elements: float) -> Satellite:
 
 
 def scenes(count: int) -> tuple[Target, ...]:
-    """Return points as dense as scene centres under a polar orbit: denser to the poles."""
+    """Return points as dense as scene centres under a polar orbit: denser towards the poles."""
     rng = np.random.default_rng(0)
     along = np.radians(rng.uniform(-60.0, 100.0, count))
     lat = np.degrees(np.arcsin(np.sin(np.radians(98.2)) * np.sin(along)))
@@ -89,7 +89,7 @@ def _targets(lat: Any, lon: Any) -> tuple[Target, ...]:
 
 
 def ours(case: Case, threads: int = 1) -> int:
-    """Return the number of windows, from the elements and the targets on."""
+    """Return the number of windows, computed from elements and targets."""
     sites, own = Sites.of(case.targets), TargetLimits.of(case.targets)
 
     def windows_of(one: Satellite) -> int:
@@ -127,7 +127,7 @@ def brahe_windows(case: Case, brahe: Any) -> int:
 
 
 def timed(run: Callable[[], int], times: int) -> tuple[float, int]:
-    """Return the median seconds, and what was found."""
+    """Return the median seconds, and the result."""
     taken, found = [], 0
     for _ in range(times):
         began = time.perf_counter()

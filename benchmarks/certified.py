@@ -1,11 +1,11 @@
-"""How near certified plans are to the best, and in what time (``python -m benchmarks.certified``).
+"""How close certified plans are to the best, and how fast (``python -m benchmarks.certified``).
 
 Prints, for each size of the paper's mission and its draws, how many plans are proven optimal,
-median and greatest CPU seconds, the greatest that a gap within ``NEAR`` took, and the greatest
-gap at the end. Without resources also the CPU seconds of HiGHS on the paper's pairwise program
-and of CP-SAT (extra ``peers``, left out where it is not installed) over those of ours. Each solve
-is one process on one core, warmed up on a small mission and given ``LIMIT_S`` CPU seconds (CP-SAT:
-seconds of the clock); a peer that ran out of them counts with what it used.
+median and greatest CPU seconds, the longest time to a gap within ``NEAR``, and the greatest gap at
+the end. Without resources also the CPU seconds of HiGHS on the paper's pairwise program and of
+CP-SAT (extra ``peers``, left out if it is not installed) relative to ours. Each solve is one
+process on one core, warmed up on a small mission and given ``LIMIT_S`` CPU seconds (CP-SAT:
+seconds of the clock); a peer that ran out of time counts with the time it used.
 
 ``python -m benchmarks.certified 1000 2000 --families free --draws 3 --alone`` picks sizes, families
 and draws, and leaves out the peers; ``--peers pairwise`` leaves out the others.
@@ -40,7 +40,7 @@ FAMILIES: Final[Mapping[str, Mapping[str, Any]]] = {
     "physical-code": {"use_resources": True, "dynamics": "physical", "preset": "paper_code"},
     "paper-code": {"use_resources": True, "dynamics": "paper", "preset": "paper_code"},
 }
-"""Without resources, and by dynamics with the rates of the paper's text or of its code."""
+"""Without resources, and for each dynamics with the rates of the paper's text or of its code."""
 
 
 def _budget(watch: Callable[[Progress], None] | None = None) -> Budget:
@@ -50,7 +50,7 @@ def _budget(watch: Callable[[Progress], None] | None = None) -> Budget:
 
 
 def certified(problem: Problem) -> dict[str, float]:
-    """Return reward and bound of our solver, and when they were near each other."""
+    """Return reward and bound of our solver, and when the gap was within ``NEAR``."""
     from planner_core.certified.solver import Certified
     from planner_core.referee.replay import replay
 
@@ -70,7 +70,7 @@ def certified(problem: Problem) -> dict[str, float]:
 
 
 def pairwise(problem: Problem) -> dict[str, float]:
-    """Return reward and bound of HiGHS on the paper's program, as it comes."""
+    """Return reward and bound of HiGHS on the paper's program, with default settings."""
     from planner_core.certified.mip.highs import Engine
     from planner_core.certified.mip.model import plan_program
 
@@ -102,7 +102,7 @@ PEERS = ("pairwise", "cp_sat")
 
 
 def one(method: str, family: str, num_targets: int, draw: int) -> dict[str, Any]:
-    """Return what one solve came to, after a warm-up."""
+    """Return the result of one solve, after a warm-up."""
     solve = METHODS[method]
     solve(problem_of(paper_scenario(WARM_UP, 99, **FAMILIES[family])))
     problem = problem_of(paper_scenario(num_targets, draw, **FAMILIES[family]))

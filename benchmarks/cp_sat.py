@@ -1,7 +1,7 @@
 """CP-SAT on a program read from standard input; it cannot share a process with HiGHS.
 
-The program: ``worth`` of each yes-or-no column, ``groups`` of columns of which one at most may
-be taken, and ``limit_s``. Answers its best objective, its bound and CPU seconds as JSON.
+The program: ``worth`` of each binary column, ``groups`` of columns of which at most one may be
+chosen, and ``limit_s``. Prints its best objective, its bound and CPU seconds as JSON.
 """
 
 from __future__ import annotations

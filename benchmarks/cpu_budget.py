@@ -11,14 +11,14 @@ _PACE_FROM_S = 0.05  # CPU seconds; before that the pace is a guess
 
 
 class CpuBudget(Budget):
-    """Ends after CPU seconds of this process, or at a time of the clock.
+    """A budget that ends after CPU seconds of this process, or at a wall-clock time.
 
     Parameters
     ----------
     cpu_s
         CPU seconds from now, infinite for no limit.
     deadline
-        When to stop whatever was used, as ``time.time`` tells it.
+        When to stop in any case, as ``time.time`` gives it.
     """
 
     def __init__(self, cpu_s: float, deadline: float):
@@ -27,11 +27,11 @@ class CpuBudget(Budget):
         self._began_s, self._began_cpu_s = time.monotonic(), time.process_time()
 
     def is_spent(self) -> bool:
-        """Return whether the CPU seconds, or the time, are over."""
+        """Return whether the CPU seconds or the time are used up."""
         return super().is_spent() or self._used_s() >= self._cpu_s
 
     def remaining_s(self) -> float:
-        """Return the seconds that the CPU seconds left take at the pace so far."""
+        """Return how long the remaining CPU seconds last at the pace so far."""
         used_s = self._used_s()
         passed_s = time.monotonic() - self._began_s
         pace = max(1.0, passed_s / used_s) if used_s > _PACE_FROM_S else 1.0

@@ -1,4 +1,4 @@
-"""A fleet planned with all defaults, beside plans that count images alone.
+"""A fleet planned with all defaults, compared with plans that count images alone.
 
 Run as ``python -m benchmarks.default_fleet SATELLITES.tle CITIES.csv STATIONS.geojson``, with
 element sets of Earth-observation satellites, cities as ``id,lat,lon`` and stations as GeoJSON

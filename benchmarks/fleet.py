@@ -1,10 +1,10 @@
 """Plans and bounds of whole fleets (``python -m benchmarks.fleet SPACECRAFT CITIES STATIONS``).
 
-Runs each case in a process of its own, after a warm-up, for so many CPU seconds (with ``--threads``
-above 1: seconds by the clock). Prints
-opportunities, CPU seconds of the access search, of compiling the problem and of ``certified``, what
-plan and bound came to, the most memory that was held, and when the gap was first within some
-shares of the bound. The files are those of the public benchmark (``benchmarks.fleet_missions``).
+Runs each case in a process of its own, after a warm-up, for the given CPU seconds (with
+``--threads`` above 1: seconds by the clock). Prints the number of opportunities, CPU seconds of the
+access search, of compiling the problem and of ``certified``, reward and bound, peak memory, and
+when the gap was first within some shares of the bound. The files are those of the public benchmark
+(``benchmarks.fleet_missions``).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _WARM_UP: Final = Case(num_satellites=2, num_targets=40, time_s=60.0)
 
 
 def one(files: Files, case: Case, seed: int, num_threads: int) -> dict[str, Any]:
-    """Return what one case came to."""
+    """Return the result of one case."""
     scenario = fleet_scenario(
         files, case.num_satellites, case.num_targets,
         use_resources=case.use_resources, dynamics=case.dynamics,
@@ -106,7 +106,7 @@ def main() -> None:
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--curve", action="store_true", help="print how plan and bound went")
+    parser.add_argument("--curve", action="store_true", help="print plan and bound over time")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     files = Files(spacecraft=options.spacecraft, cities=options.cities, stations=options.stations)

@@ -1,4 +1,4 @@
-"""Fleets over cities: the public benchmark's satellites, and larger ones drawn after it.
+"""Fleets over cities: the public benchmark's satellites, and larger fleets modelled on it.
 
 The benchmark is Eddy and Kochenderfer's ("A Maximum Independent Set Method for Scheduling
 Earth-Observing Satellite Constellations", 2021): circular orbits of 97.4 degrees, a day from
@@ -30,12 +30,12 @@ from planner_core.domain import (
 from planner_core.orbits.tle import parse_tle
 
 START: Final = datetime(2020, 1, 1, tzinfo=UTC)
-_SPREAD_DEG: Final = 2.0  # of the further targets around the cities
+_SPREAD_DEG: Final = 2.0  # of additional targets around the cities
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Files:
-    """Where the benchmark's satellites and the cities are."""
+    """Paths of the benchmark's satellites and cities."""
 
     spacecraft: Path
     cities: Path
@@ -64,7 +64,7 @@ def fleet_scenario(
 
 
 def satellites(path: Path, number: int) -> tuple[Satellite, ...]:
-    """Return the file's satellites, or as many as the first in planes spread evenly."""
+    """Return the file's satellites, or copies of the first in evenly spread planes."""
     known = []
     for record in json.loads(path.read_text(encoding="utf-8")):
         orbit = replace(parse_tle([record["line1"], record["line2"]]), name=record["name"])
@@ -100,7 +100,7 @@ def satellites(path: Path, number: int) -> tuple[Satellite, ...]:
 
 
 def targets(path: Path, number: int) -> tuple[Target, ...]:
-    """Return the largest cities, and beyond the file's number seeded points around them."""
+    """Return the largest cities, then seeded points around them once the file has no more."""
     with path.open(encoding="utf-8", newline="") as lines:
         rows = list(csv.DictReader(lines))
     lat = np.array([float(row["lat"]) for row in rows])

@@ -1,10 +1,10 @@
-"""What a choice of starts gains, and how near to the best (``python -m benchmarks.flexible``).
+"""What a choice of starts gains, and how close to the best (``python -m benchmarks.flexible``).
 
-Prints, for each size of the paper's mission without resources and each ``collect_spacing_s``, what
-solver ``certified`` comes to on one core in ``LIMIT_S`` CPU seconds: plan, bound, gap, CPU seconds
+Prints, for each size of the paper's mission without resources and each ``collect_spacing_s``, the
+result of solver ``certified`` on one core in ``LIMIT_S`` CPU seconds: plan, bound, gap, CPU seconds
 and peak memory. One run each, in a process of its own, after a warm-up on a small mission; access
-and opportunities are not counted. Beside it the plans of forward search (3, 3) and of MCTS with its
-defaults, and their CPU seconds.
+and opportunities are not counted. For comparison the plans of forward search (3, 3) and of MCTS
+with its defaults, and their CPU seconds.
 
 ``python -m benchmarks.flexible 1000 --spacings 15 5 --draw 1`` picks sizes, spacings and a draw.
 """
@@ -31,13 +31,13 @@ WARM_UP: Final = 60  # targets
 
 
 def mission(num_targets: int, draw: int, spacing_s: float | None) -> Problem:
-    """Return one day of the paper's satellite with starts so far apart."""
+    """Return one day of the paper's satellite with starts this far apart."""
     scenario = paper_scenario(num_targets, draw, use_resources=False)
     return problem_of(replace(scenario, collect_spacing_s=spacing_s))
 
 
 def one(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
-    """Return what one solve came to, after a warm-up."""
+    """Return the result of one solve, after a warm-up."""
     from planner_core.budget import Budget
     from planner_core.referee.replay import replay
     from planner_core.solvers.registry import Certified, ForwardSearch, Mcts
@@ -74,7 +74,7 @@ def one(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
 
 
 def apart(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any]:
-    """Return the same from a process of its own."""
+    """Return the same, computed in a process of its own."""
     command = [sys.executable, "-m", "benchmarks.flexible", str(num_targets), "--draw", str(draw)]
     command += ["--one", "--spacings", "none" if spacing_s is None else str(spacing_s)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
@@ -83,7 +83,7 @@ def apart(num_targets: int, draw: int, spacing_s: float | None) -> dict[str, Any
 
 
 def spacing(text: str) -> float | None:
-    """Return a spacing as the scenario takes it."""
+    """Return a spacing in the scenario's form."""
     return None if text == "none" else float(text)
 
 

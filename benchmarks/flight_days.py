@@ -1,12 +1,11 @@
 """Whole days flown: each planner's timeline of a scenario file and its variants, as a table.
 
 ``python -m benchmarks.flight_days SCENARIO.json FOLDER`` plans a scenario file's mission with
-and without resources, and with several starts in each access, by every solver named, flies all in
-Basilisk (``benchmarks.flight``, in the interpreter that ``--python`` names), and prints a table
-of Markdown. Scenario files, timelines and what each flight said are left in the folder. With
-``--first-release`` missions are planned as the first release would have had them, with turns from
-rest to rest and charge in all idle time, and flown by the spacecraft as it is, those with
-continuous starts as well.
+and without resources, and with several starts in each access, by each given solver, flies all in
+Basilisk (``benchmarks.flight``, in the interpreter given by ``--python``), and prints a Markdown
+table. Scenario files, timelines and reports of the flights are left in the folder. With
+``--first-release`` missions are planned as by the first release, with slews from rest to rest and
+charge in all idle time, and flown by the spacecraft as it is, also those with continuous starts.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ Document = dict[str, Any]
 
 
 def _without_resources(scenario: Document) -> Document:
-    # Without them nothing comes down, so an objective that asks for delivery has no meaning.
+    # Without them nothing is downlinked, so an objective that counts delivery has no meaning.
     return {key: scenario[key] for key in scenario if key != "objective"} | {"use_resources": False}
 
 
@@ -56,8 +55,7 @@ _FIGURES: Final = {
 def known_before(scenario: Document) -> Document:
     """Return a scenario in the terms of the first release.
 
-    Turns lead from rest to rest, all idle time charges, and what is drawn at all times counts
-    with each mode.
+    Slews go from rest to rest, all idle time charges, and the constant load is added to each mode.
     """
     satellites = [
         {
@@ -112,7 +110,7 @@ def main() -> None:
     parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS))
     parser.add_argument("--solvers", nargs="*", default=list(SOLVERS))
     parser.add_argument("--first-release", action="store_true",
-                        help="plan with its turns and its charge")  # fmt: skip
+                        help="plan with its slews and its charge")  # fmt: skip
     parser.add_argument("--time-s", type=float, default=20.0, help="of the clock, for each plan")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -121,7 +119,7 @@ def main() -> None:
     print(f"|{'---|' * (len(_FIGURES) + 3)}")
     with ThreadPoolExecutor(max_workers=2) as pool:
         for name in options.variants:
-            # Continuous starts are refused where turns begin and end in motion.
+            # Continuous starts are refused if slews begin and end in motion.
             if name.startswith("continuous") and not options.first_release:
                 continue
             path = options.folder / f"{name.replace(', ', '-').replace(' ', '-')}.json"

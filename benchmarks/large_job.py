@@ -1,9 +1,9 @@
 """A huge job seen from outside (``python -m benchmarks.large_job SPACECRAFT CITIES``).
 
 Starts ``slewline serve`` as a process of its own, sends it a fleet over cities, follows the job
-and reads its answer in pages and in every form. Prints how long each call took, what it sent,
-and the most memory that the processes of the service held meanwhile (resident, in MB). The files
-are those of ``benchmarks.fleet_missions``. ``--keep`` goes on serving, for a look at the pages.
+and reads its answer in pages and in every form. Prints how long each call took, the size of its
+answer, and the service's peak memory meanwhile (resident, in MB). The files are those of
+``benchmarks.fleet_missions``. ``--keep`` keeps serving, for a look at the pages.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _SAMPLE_S: Final = 0.02
 
 
 class Held:
-    """The most memory that each kind of process has held since it was last asked, in MB."""
+    """Peak memory of each kind of process since the last call of ``taken``, in MB."""
 
     def __init__(self, root: psutil.Process):
         self._root = root
@@ -50,7 +50,7 @@ class Held:
         self._thread.join()
 
     def taken(self) -> dict[str, float]:
-        """Return the peaks, and begin anew."""
+        """Return the peaks, and start again."""
         self._sample()
         most, self._most = self._most, defaultdict(float)
         return dict(most)
@@ -79,7 +79,7 @@ def process_kind(process: psutil.Process) -> str:
 
 
 def satellite_of(satellite: Satellite) -> Json:
-    """Return what is posted of a satellite."""
+    """Return the body that is posted for a satellite."""
     agility = satellite.agility
     return {
         "name": satellite.name,
@@ -110,7 +110,7 @@ def store(client: httpx.Client, scenario: Scenario) -> Json:
 
 
 def followed(client: httpx.Client, job: Json) -> tuple[Json, int]:
-    """Return a job that has ended, and how many changes it showed on the way."""
+    """Return a job that has ended, and how many changes it reported on the way."""
     num_changes = 0
     version = ""
     while job["state"] in ("queued", "running", "cancelling"):
@@ -138,7 +138,7 @@ def pages(client: httpx.Client, path: str, wanted: Json) -> Iterator[tuple[float
 
 @contextmanager
 def told(held: Held, what: str) -> Iterator[dict[str, Any]]:
-    """Print what a step took and the memory held in it."""
+    """Print how long a step took and its peak memory."""
     notes: dict[str, Any] = {}
     held.taken()
     began = time.perf_counter()
@@ -150,7 +150,7 @@ def told(held: Held, what: str) -> Iterator[dict[str, Any]]:
 
 
 def read_answer(service: Served, held: Held, job: Json) -> None:
-    """Read pages and forms of an answer."""
+    """Read an answer in pages and in every form."""
     client, path = service.client, f"/v1/jobs/{job['id']}"
     for wanted in ({}, {"outcome": "unscheduled"}):
         with told(held, f"targets {wanted}, {PAGE} a page") as notes:
@@ -193,7 +193,7 @@ def main() -> None:
     parser.add_argument("--time-s", type=float, default=60.0)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--database-url", help="an empty database; a SQLite file by default")
-    parser.add_argument("--keep", action="store_true", help="go on serving")
+    parser.add_argument("--keep", action="store_true", help="keep serving")
     chosen = parser.parse_args()
     scenario = fleet_scenario(
         Files(spacecraft=chosen.spacecraft, cities=chosen.cities), chosen.satellites, chosen.targets

@@ -1,7 +1,7 @@
-"""What the MILP proves, and in what time (``python -m benchmarks.milp``).
+"""What the MILP proves, and how fast (``python -m benchmarks.milp``).
 
 Prints, for the paper's mission without resources, the CPU seconds of both formulations and their
-ratio; then plan and bound with resources. Each search may take ``LIMIT_S`` at most.
+ratio; then plan and bound with resources. Each search may take at most ``LIMIT_S``.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def timed(problem: Problem, solver: Milp) -> tuple[Solution, float, float]:
 
 
 def row(problem: Problem, solver: Milp) -> tuple[str, float]:
-    """Return what one search came to, and its CPU seconds."""
+    """Return the result of one search, and its CPU seconds."""
     solution, reward, solve_s = timed(problem, solver)
     bound = f"{solution.bound:5.0f}" if solution.bound is not None else "    -"
     return f"{solve_s:8.2f} {reward:6.0f} {bound} {solution.termination:>12}", solve_s

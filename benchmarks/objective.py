@@ -1,8 +1,8 @@
-"""Images taken, on the ground, and their age, over ``collected_share`` and ``half_life_s``.
+"""Images taken, images downlinked and their age, over ``collected_share`` and ``half_life_s``.
 
 Run as ``python -m benchmarks.objective CSV PNG``. It plans the demonstration's mission, and the
-same with four such satellites in planes 45 deg apart, for every objective below, and draws the two.
-What the CSV holds already is not planned again.
+same with four such satellites in planes 45 deg apart, for every objective below, and plots both.
+Rows that the CSV already holds are not planned again.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def _figures(num_satellites: int, share: float, half_life_h: float | None, cpu_s
 
 def _asked(missions: list[str]) -> Iterator[tuple[str, float, float | None]]:
     for mission, share, half_life_h in itertools.product(missions, _SHARES, _HALF_LIVES_H):
-        # Where all is earned by the image, nothing is left to decay.
+        # If images earn everything when taken, nothing is left to decay.
         if share < 1.0 or half_life_h is None:
             yield mission, share, half_life_h
 
@@ -155,7 +155,7 @@ def _draw(rows: list[dict[str, str]], picture: Path) -> None:
 
 
 def main() -> None:
-    """Plan what is not in the table yet, and draw it."""
+    """Plan what is missing in the table, and plot it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("table", type=Path)
     parser.add_argument("picture", type=Path)

@@ -1,4 +1,4 @@
-"""Many dashboards that look at jobs, in a process of its own and at little cost to itself."""
+"""Many dashboards that poll jobs, in one process and at little cost."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PERIOD_S = 1.0
 
 @contextmanager
 def polling(base_url: str, job_ids: Sequence[str], number: int) -> Iterator[Callable[[], int]]:
-    """Let so many clients poll these jobs, each one of them; yields what stops and counts them."""
+    """Let many clients poll one of these jobs each; yield a function that stops and counts them."""
     context = multiprocessing.get_context("spawn")
     stop, answers = context.Event(), context.Value("l", 0)
     args = (base_url, list(job_ids), number, stop, answers)
@@ -53,7 +53,7 @@ async def _poll_all(
 
 
 async def _poll(base_url: str, job_ids: list[str], at: int, phase: float, answers: Any) -> None:
-    """Look at a job until it has ended, then at the next one that has not."""
+    """Poll a job until it has ended, then the next one that has not."""
     address = urlsplit(base_url)
     await asyncio.sleep(phase * PERIOD_S)
     reader, writer = await asyncio.open_connection(address.hostname, address.port)

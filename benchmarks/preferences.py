@@ -1,4 +1,4 @@
-"""What each secondary aim comes to on the paper's missions, and that it costs no worth.
+"""The effect of each secondary aim on the paper's missions, and that it costs no worth.
 
 Run as ``python -m benchmarks.preferences``; it prints a table.
 """

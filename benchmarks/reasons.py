@@ -1,8 +1,8 @@
-"""What reasons cost, beside the accesses of the same scenario (``python -m benchmarks.reasons``).
+"""The cost of reasons, relative to the scenario's access search (``python -m benchmarks.reasons``).
 
 Prints CPU seconds, each the median of several runs after a warm-up: access search, compiling,
-the reasons of all targets (with the smallest changes), and one target explained at length. Ends
-with status 1 where the reasons cost as much as the access search.
+the reasons of all targets (with the smallest changes), and one target explained in detail. Ends
+with status 1 if the reasons cost as much as the access search.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RUNS = 9
 
 
 def median_cpu_s(work: Callable[[], object]) -> float:
-    """Return the median CPU seconds of some work, warm."""
+    """Return the median CPU seconds of some work after a warm-up."""
     work()
     times = []
     for _ in range(RUNS):

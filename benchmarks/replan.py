@@ -1,15 +1,15 @@
-"""What a day's events do to a plan, replanned and planned anew (``python -m benchmarks.replan``).
+"""A day's events, replanned and planned from scratch (``python -m benchmarks.replan``).
 
-Prints for each mission and event what a replan of ``LIMIT_S`` CPU seconds came to: reward and bound
-after the freeze, the share of the plan's later actions that it moved or removed, what of that was
-lost whatever is planned, and the least that any valid plan changes, and any that earns as much,
-where that is proven. Beside it what solver ``certified`` makes of the same problem from scratch.
+Prints for each mission and event the result of a replan of ``LIMIT_S`` CPU seconds: reward and
+bound after the freeze, the share of the plan's later actions that it moved or removed, how much of
+that was unavoidable, and the least that any valid plan changes, and any that earns as much, if that
+is proven. For comparison the result of solver ``certified`` on the same problem from scratch.
 Access and compilation are not counted. One run each, on one core, after a warm-up on a small
 mission.
 
-``python -m benchmarks.replan one`` or ``four`` picks the mission. ``--fleet SPACECRAFT CITIES`` is
-the mission of ``benchmarks.fleet`` with 24 satellites and 10,000 targets: urgent requests one by
-one, on a worker that holds the plan, and what each step takes.
+``python -m benchmarks.replan one`` or ``four`` selects the mission. ``--fleet SPACECRAFT CITIES``
+is the mission of ``benchmarks.fleet`` with 24 satellites and 10,000 targets: urgent requests one by
+one, on a worker that holds the plan, and the time of each step.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ FREEZE: Final = NOW + timedelta(minutes=18)
 OUT: Final = timedelta(hours=6)
 MISSIONS: Final = {"one": (1, 1000), "four": (4, 2000)}
 _URGENT_REWARD: Final = 10.0
-_NEW: Final = 0.05  # of the targets, that come in at once
+_NEW: Final = 0.05  # share of targets that arrive at once
 _DRAWS: Final = 6  # of urgent requests
 FLEET: Final = (24, 10_000)
 _ROUNDING: Final = 1e-6
@@ -66,7 +66,7 @@ _ROUNDING: Final = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Day:
-    """A mission, and the plan that is in force."""
+    """A mission, and the plan in force."""
 
     scenario: Scenario
     problem: Problem
@@ -76,12 +76,12 @@ class Day:
 
     @property
     def base(self) -> tuple[PinnedAction, ...]:
-        """Return the plan in words."""
+        """Return the plan as a client gives it."""
         return base_of(self.scenario, self.problem, self.plan)
 
 
 def base_of(scenario: Scenario, problem: Problem, plan: Plan) -> tuple[PinnedAction, ...]:
-    """Return a plan in words."""
+    """Return a plan as a client gives it."""
     table = problem.opportunities
     found = []
     for action in plan.actions:
@@ -127,7 +127,7 @@ def day_of(num_satellites: int, num_targets: int) -> Day:
 
 
 def events_of(day: Day) -> Iterator[tuple[str, Scenario]]:
-    """Yield what happens, and the question that it leaves."""
+    """Yield each event, and the scenario to replan after it."""
     asked = replace(day.scenario, replan=Replan(base=day.base, freeze_until=FREEZE))
     rng = np.random.default_rng(7)
     for draw, i in enumerate(rng.permutation(len(day.later_targets))[:_DRAWS]):
@@ -155,7 +155,7 @@ def events_of(day: Day) -> Iterator[tuple[str, Scenario]]:
 def measure(
     name: str, scenario: Scenario, known: KnownMultipliers | None, *, is_brief: bool
 ) -> str:
-    """Return a line of the table; a brief one has nothing but the replan."""
+    """Return a line of the table; a brief one holds only the replan."""
     problem = problem_of(scenario)
     question = question_of(scenario, problem)
     began = time.process_time()
@@ -184,7 +184,7 @@ def measure(
 
 
 def _least(question: Question) -> str:
-    """Return the least share that any valid plan changes, contacts that are kept left out."""
+    """Return the least share that any valid plan changes, ignoring contacts that are kept."""
     problem = question.problem
     found = None
     if problem.use_resources:
@@ -196,10 +196,10 @@ def _least(question: Question) -> str:
 
 
 def _least_earning(question: Question, reward: float) -> str:
-    """Return the least share that a plan changes which earns that, by the bound of both together.
+    """Return the least share that any plan with that reward changes, by the bound on both together.
 
-    Every image kept counts ``stability.weight`` there, so that the bound and what is earned leave
-    room for so many of them.
+    Every image kept counts ``stability.weight`` there, so the difference between the bound and
+    the reward limits the number of images kept.
     """
     if not question.problem.use_resources or question.promised:
         return "-"
@@ -211,7 +211,7 @@ def _least_earning(question: Question, reward: float) -> str:
 
 
 def _share_changed(question: Question, num_kept: int) -> str:
-    """Return the share of the base that is changed where so many of its images are kept."""
+    """Return the share of the base that changes if this number of its images is kept."""
     problem = question.problem
     is_image = problem.opportunities.kind[question.base] == COLLECT
     start_s = problem.opportunities.start_s
@@ -222,7 +222,7 @@ def _share_changed(question: Question, num_kept: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """What one urgent request came to, in CPU seconds and in changes."""
+    """The result of one urgent request, in CPU seconds and in changes."""
 
     access_s: float
     build_s: float
@@ -232,7 +232,7 @@ class Asked:
 
 
 def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]:
-    """Yield what urgent requests come to, each by itself after the same plan in force."""
+    """Yield the results of urgent requests, each on its own after the same plan in force."""
     num_satellites, num_targets = FLEET
     whole = fleet_missions.fleet_scenario(files, num_satellites, num_targets + number)
     scenario = replace(whole, targets=whole.targets[:num_targets])
@@ -273,8 +273,8 @@ def urgent_requests(files: fleet_missions.Files, number: int) -> Iterator[Asked]
 
 
 def fleet(files: fleet_missions.Files, number: int) -> None:
-    """Print what urgent requests come to: median, 99th percentile and greatest."""
-    # The first compiles what it needs.
+    """Print the results of urgent requests: median, 99th percentile and greatest."""
+    # The first one compiles the kernels.
     found = list(urgent_requests(files, number + 1))[1:]
     print(f"\n{number} urgent requests at {FLEET[0]} x {FLEET[1]:,}\n")
     print("| figure | median | p99 | greatest |\n|---|---|---|---|")

@@ -1,8 +1,8 @@
-"""What the running service costs (``python -m benchmarks.service [--database-url URL]``).
+"""The cost of the running service (``python -m benchmarks.service [--database-url URL]``).
 
-Starts ``slewline serve`` as a process of its own on an empty database (a SQLite file, or the
-PostgreSQL database that is named) and measures it from outside. Prints times, and ratios of
-times taken in the same run, which mean more on a machine that does other things as well.
+Starts ``slewline serve`` as a process of its own on an empty database (a SQLite file, or the given
+PostgreSQL database) and measures it from outside. Prints times, and ratios of times taken in the
+same run, which mean more on a machine that is also doing other things.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Served:
     database_url: str
 
     def cpu_s(self) -> float:
-        """Return what the API's process has used; the workers are processes of their own."""
+        """Return the CPU time of the API's process; the workers are separate processes."""
         times = self.process.cpu_times()
         return float(times.user + times.system)
 
@@ -115,7 +115,7 @@ def plan(client: httpx.Client, scenario_id: str) -> None:
 
 
 def asked(mission: Json, **changes: object) -> Json:
-    """Return the body of the mission's scenario, with some of it changed."""
+    """Return the body of the mission's scenario, with some changes."""
     names = ("satellite_ids", "target_catalog_ids", "ground_station_ids", "use_resources")
     return {name: mission[name] for name in names} | {"horizon": demo_mission.HORIZON} | changes
 
@@ -136,15 +136,15 @@ def submit_to_timeline(service: Served, mission: Json) -> None:
 
 
 def polls(service: Served, mission: Json) -> None:
-    """Compare answers that are written, answers kept for others who ask the same, and 304."""
+    """Compare answers that are rendered, cached answers to repeated requests, and 304."""
     job_id = submit(service.client, mission["id"], "forward_search")
     wait(service.client, job_id)
     for name, path in (("job", f"/v1/jobs/{job_id}"), ("timeline", f"/v1/jobs/{job_id}/timeline")):
         etag = service.client.get(path).headers["etag"]
         ways = [Poll(path, {}, 200), Poll(path, {"If-None-Match": etag}, 304)]
         if name == "job":
-            ways.append(Poll(f"{path}?wait=0", {}, 200))  # which is never kept
-        # By turns, so that all meet the same neighbours on the machine.
+            ways.append(Poll(f"{path}?wait=0", {}, 200))  # which is never cached
+        # In turn, so that all are measured under the same load of the machine.
         times = [[cpu_s_of(service, way) for way in ways] for _ in range(RUNS)]
         full_s, same_s, *written_s = map(statistics.median, zip(*times, strict=True))
         kept = ""
@@ -156,7 +156,7 @@ def polls(service: Served, mission: Json) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Poll:
-    """A call, and the status it is answered with."""
+    """A call, and the expected status."""
 
     path: str
     headers: dict[str, str]
@@ -172,7 +172,7 @@ def cpu_s_of(service: Served, poll: Poll) -> float:
 
 
 def dashboards(service: Served, mission: Json, simulations: int) -> None:
-    """Compare a batch of jobs that nobody looks at with one that many look at."""
+    """Compare a batch of jobs that no client polls with one that many poll."""
     wait(service.client, submit(service.client, mission["id"], "mcts"))  # the first one is slower
     times: dict[bool, list[float]] = {False: [], True: []}
     num_polls = 0
@@ -198,7 +198,7 @@ def dashboards(service: Served, mission: Json, simulations: int) -> None:
 
 def many_jobs(service: Served, mission: Json) -> None:
     """Compare lists and polls with few and with many jobs stored."""
-    # Its answer is small: ten thousand large ones measure the disk.
+    # Its answer is small: ten thousand large ones would measure the disk.
     few_targets = service.client.post(
         "/v1/target-catalogs",
         content=demo_mission.targets_csv(20),

@@ -1,10 +1,9 @@
 """The service under steady work for hours (``python -m benchmarks.soak CSV --hours 2``).
 
-Starts ``slewline serve`` on an empty database and keeps it busy with small jobs, ten a minute
-unless told otherwise: uploads, scenarios, polls, every form of every answer, lists, event
-streams, deletions. Once a minute it writes a row: memory and descriptors of each kind of
-process, size of the database, what was called and how long calls took. ``benchmarks.soak_plot``
-draws the rows.
+Starts ``slewline serve`` on an empty database and keeps it busy with small jobs, ten a minute by
+default: uploads, scenarios, polls, every form of every answer, lists, event streams, deletions.
+Once a minute it writes a row: memory and descriptors of each kind of process, size of the database,
+number and duration of calls. ``benchmarks.soak_plot`` plots the rows.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ COLUMNS: Final = (
 
 
 class Tally:
-    """What was called since the last row, and what became of the jobs so far."""
+    """Calls since the last row, and outcomes of the jobs so far."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -69,7 +68,7 @@ class Tally:
             self.total[what] += 1
 
     def taken(self) -> dict[str, float]:
-        """Return the sums so far, and how long the calls since the last time took."""
+        """Return the sums so far, and how long the calls since the last row took."""
         with self._lock:
             times_s, self._times_s = sorted(self._times_s) or [0.0], []
             sums = {name: self.total[name] for name in ("jobs", "failed", "calls", "refused")}
@@ -80,7 +79,7 @@ class Tally:
 
 
 class Gauges:
-    """The largest memory and number of descriptors, by kind of process, since last asked.
+    """The largest memory and number of descriptors, by kind of process, since the last row.
 
     Processes of one kind are added up: two workers count together.
     """
@@ -104,13 +103,13 @@ class Gauges:
             self._most[name] = max(self._most[name], value)
 
     def taken(self) -> dict[str, float]:
-        """Return the peaks, and begin anew."""
+        """Return the peaks, and start again."""
         most, self._most = self._most, defaultdict(float)
         return dict(most)
 
 
 def database_mb(url: str) -> float:
-    """Return what the database takes on its disk."""
+    """Return the size of the database on its disk."""
     parsed = sa.make_url(url)
     if parsed.get_backend_name() == "sqlite":
         file = Path(str(parsed.database))
@@ -122,7 +121,7 @@ def database_mb(url: str) -> float:
 
 
 class Customer:
-    """Someone who plans, looks, reads and cleans up."""
+    """A client that plans, polls, reads and deletes."""
 
     def __init__(self, client: httpx.Client, tally: Tally, seed: int = 0):
         self._client = client
@@ -146,7 +145,7 @@ class Customer:
         return str(self._call("POST", "/v1/ground-stations", json=station).json()["id"])
 
     def new_question(self) -> None:
-        """Store a new scenario; delete what the one before was made of."""
+        """Store a new scenario; delete everything of the one before."""
         old_catalog_id = self._catalog_id
         targets = demo_mission.targets_csv(NUM_TARGETS, seed=self._random.randrange(10**9))
         headers = {"Content-Type": "text/csv"}
@@ -165,7 +164,7 @@ class Customer:
             self._call("DELETE", f"/v1/ground-stations/{self._post_station()}")
 
     def plan(self, number: int) -> None:
-        """Order one plan and do with it what clients do."""
+        """Order one plan and use it as clients do."""
         with self._lock:
             if number % JOBS_PER_SCENARIO == 0:
                 self.new_question()
@@ -253,7 +252,7 @@ def _raise(done: Any) -> None:
 
 
 def main() -> None:
-    """Soak one database for some hours."""
+    """Run the soak test on one database for some hours."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("table", type=Path, help="the CSV file to write")
     parser.add_argument("--hours", type=float, default=2.0)

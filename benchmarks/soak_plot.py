@@ -1,4 +1,4 @@
-"""Draw a table of ``benchmarks.soak`` (``python -m benchmarks.soak_plot CSV PNG``)."""
+"""Plot a table of ``benchmarks.soak`` (``python -m benchmarks.soak_plot CSV PNG``)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.soak import KINDS
 
 
 def main(table: str, picture: str) -> None:
-    """Draw memory, descriptors and database size over the hours."""
+    """Plot memory, descriptors and database size over the hours."""
     with Path(table).open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     hours = [float(row["minutes"]) / 60.0 for row in rows]

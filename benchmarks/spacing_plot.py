@@ -1,6 +1,6 @@
-"""Draw a table of ``slewline compare-spacing`` (``python -m benchmarks.spacing_plot CSV PNG``).
+"""Plot a table of ``slewline compare-spacing`` (``python -m benchmarks.spacing_plot CSV PNG``).
 
-Bars are plans; the line above each is what no plan of that choice of starts can exceed.
+Bars are plans; the line above each is the bound for that choice of starts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 
 def main(table: str, picture: str) -> None:
-    """Draw the table into a picture."""
+    """Plot the table into a picture."""
     with Path(table).open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     rewards = [float(row["reward"]) for row in rows]

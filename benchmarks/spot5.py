@@ -1,11 +1,11 @@
 """The SPOT-5 daily photograph scheduling instances (``python -m benchmarks.spot5 FOLDER``).
 
-Agnese et al. 1995, Bensana et al. 1999: each photograph is taken by one of its cameras or not
-at all, some cannot be taken together, pairs or triples. There is no time in the files: what
-excludes what is listed. Instances of several orbits share a recorder as well.
+Agnese et al. 1995, Bensana et al. 1999: each photograph is taken by one of its cameras or not at
+all, and some pairs or triples cannot be taken together. The files hold no times, only lists of
+exclusions. Instances of several orbits also share a recorder.
 
-The exact search here is the clique form of the planner's MILP on listed conflicts: cliques in
-place of cliques, the same engine below.
+The exact search here is the clique form of the planner's MILP, with cliques of the listed
+conflicts, solved by the same engine.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Choice = tuple[int, int]
 _HEURISTIC_EFFORT = 0.05
 _LIMIT_S = 120.0
 _RECORDER_UNIT = 451.0
-_RECORDER_UNITS = 200  # the results in the literature count in these, not in the file's numbers
+_RECORDER_UNITS = 200  # the published results count in these, not in the file's unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,8 +46,8 @@ class Instance:
     forbidden
         Choices that cannot all be made, two or three at a time.
     fill, capacity
-        What each choice fills of the recorder and what that holds, in the unit of the
-        published results; None where there is a single orbit and no such limit.
+        How much of the recorder each choice fills, and its capacity, in the unit of the
+        published results; None for a single orbit, which has no such limit.
     """
 
     weight: Mapping[int, int]
@@ -63,7 +63,7 @@ def read_instance(path: Path) -> Instance:
     Raises
     ------
     ValueError
-        Where the file is not in the format.
+        If the file is not in the format.
     """
     lines = (line.split() for line in path.read_text(encoding="ascii").splitlines() if line.strip())
     weight: dict[int, int] = {}
@@ -103,7 +103,7 @@ def _next(lines: Iterator[list[str]], path: Path) -> list[str]:
 
 
 def solve(instance: Instance, budget: Budget) -> tuple[frozenset[Choice], float]:
-    """Return the best choices found and what no others can exceed."""
+    """Return the best choices found and an upper bound."""
     choices = [(i, value) for i, values in instance.choices.items() for value in values]
     column = {choice: at for at, choice in enumerate(choices)}
     program = Program()
@@ -125,12 +125,12 @@ def solve(instance: Instance, budget: Budget) -> tuple[frozenset[Choice], float]
 
 
 def worth_of(instance: Instance, taken: frozenset[Choice]) -> int:
-    """Return what choices are worth, checked against the file's own rules.
+    """Return the worth of choices, checked against the file's own rules.
 
     Raises
     ------
     ValueError
-        Where they break one.
+        If they break one.
     """
     photographs = [i for i, _ in taken]
     if len(set(photographs)) < len(photographs):
@@ -159,7 +159,7 @@ def _exclusions(instance: Instance) -> Mapping[Choice, set[Choice]]:
 def _cliques(
     choices: Sequence[Choice], excludes: Mapping[Choice, set[Choice]]
 ) -> Iterator[list[Choice]]:
-    """Yield sets of choices of which one can be made, until every exclusion is in one."""
+    """Yield sets of choices that exclude each other, until every exclusion is in one."""
     covered: set[frozenset[Choice]] = set()
     for a in choices:
         for b in sorted(excludes[a]):
@@ -176,7 +176,7 @@ def _cliques(
 
 
 def _triples(instance: Instance) -> Iterator[list[Choice]]:
-    """Yield sets of choices of which two can be made: ways to take a third share a row."""
+    """Yield sets of choices of which two can be made: third photographs' cameras share a row."""
     thirds: dict[tuple[Choice, Choice, int], list[Choice]] = defaultdict(list)
     for together in instance.forbidden:
         if len(together) == 3:

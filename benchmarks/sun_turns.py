@@ -1,9 +1,9 @@
 """Missions whose satellites turn to the sun to charge: plans, bounds, and the simple planners.
 
 ``python -m benchmarks.sun_turns`` plans the paper's mission at four sizes and three agilities, and
-prints the gap of ``certified`` after 20 CPU seconds and what share of its plan the planners
-without a proof reach. ``--fleet SPACECRAFT CITIES STATIONS`` plans four satellites over 2,000
-cities as well, in 60.
+prints the gap of ``certified`` after 20 CPU seconds and the share of its plan's reward that the
+planners without a proof reach. ``--fleet SPACECRAFT CITIES STATIONS`` plans four satellites over
+2,000 cities as well, in 60.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Case:
 
 
 def with_sun_turns(scenario: Scenario, agility: Agility | None, *, eclipse_aware: bool) -> Scenario:
-    """Return a scenario whose satellites charge between turns to the sun alone."""
+    """Return a scenario whose satellites charge only between turns to the sun and back."""
     satellites = tuple(
         replace(
             satellite,

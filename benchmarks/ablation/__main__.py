@@ -1,8 +1,8 @@
-"""Run the ablation as far as it is missing, and write its page.
+"""Run the missing parts of the ablation, and write its page.
 
 ``python -m benchmarks.ablation`` tries all strategies, ``--constants`` also half and double of the
-constants (hours), ``--only`` what holds one of some words in its name, ``--anew`` what is known of
-another revision too. Rows go into docs/ablation.csv, the page of them into docs/ablation.md.
+constants (hours), ``--only`` changes whose name contains one of these words, ``--anew`` also those
+known from another revision. Rows go into docs/ablation.csv, their page into docs/ablation.md.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _ROWS: Final = Path("docs/ablation.csv")
 
 
 def main() -> None:
-    """Do what the command line asks for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.ablation", description=__doc__)
     parser.add_argument("--into", type=Path, default=_ROWS, metavar="FILE")
     parser.add_argument("--constants", action="store_true", help="half and double of each as well")
     parser.add_argument("--only", nargs="+", default=[""], metavar="WORD")
-    parser.add_argument("--anew", action="store_true", help="also what other revisions have told")
+    parser.add_argument("--anew", action="store_true", help="also what other revisions have run")
     options = parser.parse_args()
     changes = {**STRATEGIES, **(constants() if options.constants else {})}
     chosen = [name for name in changes if any(word in name for word in options.only)]

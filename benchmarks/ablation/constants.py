@@ -1,6 +1,6 @@
 """The constants of ``certified``: the fields of its tuning, each halved and doubled.
 
-A field that compiled kernels read is frozen into them and is left out.
+A field that compiled kernels read is a constant in them and is left out.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ _ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
     "proofs.satellite_relaxation": {**_ONE, **_DELIVERED},
     "proofs.shares": _ONE,
 }
-"""Where what a module reads acts: families and CPU seconds."""
+"""Families on which a module's constants have an effect, and CPU seconds."""
 
 
 def constants() -> dict[str, Change]:
@@ -92,19 +92,19 @@ def modules() -> Iterator[ModuleType]:
 
 
 def fields_read_by(module: ModuleType) -> set[str]:
-    """Return which fields of the tuning a module reads whenever it runs.
+    """Return which fields of the tuning a module reads each time it runs.
 
-    What it reads once, for its kernels, it keeps under a name in capitals.
+    A value read once, for its kernels, is kept under a name in capitals.
     """
-    source: str = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]  # of a file: has one
+    source: str = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]
     running = "\n".join(line for line in source.splitlines() if line[:1].isspace())
     return {each.name for each in fields(Tuning) if f"TUNING.{each.name}" in running}
 
 
 def scaled(value: Any, factor: float) -> Any:
-    """Return a number, or several, times a factor; whole ones stay whole and 1 at least.
+    """Return one or several numbers times a factor; integers stay integers, at least 1.
 
-    Of a share above one half it is the rest to 1 that is multiplied: 0.98, 0.99, 0.995.
+    For a share above one half the rest to 1 is multiplied: 0.98, 0.99, 0.995.
     """
     if isinstance(value, tuple):
         return tuple(scaled(each, factor) for each in value)

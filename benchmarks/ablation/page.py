@@ -1,4 +1,4 @@
-"""The ablation's rows as a page: what each strategy is worth, and what constants do."""
+"""The ablation's rows as a page: the gain of each strategy, and the effect of the constants."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from benchmarks.suite.engine import LEVELS, Case
 POINTS: Final = 0.2  # of gap
 RATIO: Final = 1.1  # of time
 LABELS: Final = tuple(f" {label}" for label in FACTORS)
-"""How changes of constants end."""
+"""Endings of the names of changed constants."""
 
 _CONSTANTS: Final = """\
 One draw of each family, and half and double of each constant that acts there. A change of one image
@@ -52,28 +52,28 @@ after 0.4 CPU seconds with it, and 233.5 without.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """A change on one family, beside the solver as it is."""
+    """A change on one family, compared with the unchanged solver."""
 
     change: str
     line: Line
 
     @property
     def is_worse(self) -> bool:
-        """Whether what was changed is missed."""
+        """Whether the solver is worse with the change."""
         slower = (ratio is not None and ratio > RATIO for ratio in self.line.ratios)
         return self.line.points > POINTS or any(slower) or self.line.failures > 0
 
     @property
     def time(self) -> float | None:
-        """The ratio of times over all gaps that were reached, if any was."""
+        """The geometric mean of the ratios of times to each gap, if any was reached."""
         known = [math.log(ratio) for ratio in self.line.ratios if ratio is not None]
         return math.exp(sum(known) / len(known)) if known else None
 
 
 def findings(trials: Iterable[Trial]) -> list[Finding]:
-    """Return what each change has done to each family, in the order of the rows.
+    """Return the effect of each change on each family, in the order of the rows.
 
-    The latest row of a change and a case counts, beside the latest before it without a change.
+    The latest row of a change and case counts, compared with the latest unchanged one before it.
     """
     plain: dict[Case, Trial] = {}
     by_change: dict[str, dict[Case, tuple[Trial, Trial]]] = {}
@@ -110,7 +110,7 @@ def page(trials: Sequence[Trial]) -> str:
 
 
 def strategy_table(found: Sequence[Finding]) -> str:
-    """Return a line for each strategy and family: what it is like without."""
+    """Return a line for each strategy and family: the result without it."""
     levels = [f"time to {100.0 * level:g} %" for level in LEVELS]
     head = ["without", "family", "cases", "gap %", "then", "points", *levels, "missed"]
     rows = []
@@ -124,7 +124,7 @@ def strategy_table(found: Sequence[Finding]) -> str:
 
 
 def constant_table(found: Sequence[Finding]) -> str:
-    """Return a line for each constant and family: what half and double of it do."""
+    """Return a line for each constant and family: the effect of halving and doubling it."""
     pairs: dict[tuple[str, str], dict[str, Finding]] = {}
     for finding in found:
         constant, _, label = finding.change.rpartition(" ")

@@ -1,6 +1,6 @@
 """The strategies of ``certified`` and how each is switched off, by name.
 
-Most are left out of the engine's own list, by their name there. Bounds stay valid in all variants.
+Most are removed from the engine's own list, by their name there. Bounds stay valid in all variants.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from planner_core.certified.tuning import TUNING, tune
 
 ENGINE: Final = "planner_core.certified"
 NOTHING: Final = ""
-"""The change that changes nothing."""
+"""The unchanged solver."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Patch:
-    """A name in a module, with dots for members of a class, and what takes its place there."""
+    """A name in a module, with dots for members of a class, and its replacement."""
 
     module: str
     name: str
@@ -37,7 +37,7 @@ class Patch:
         Raises
         ------
         AttributeError
-            Where there is no such name: a patch that misses would measure nothing.
+            If there is no such name: a patch without effect would measure nothing.
         """
         *owners, last = self.name.split(".")
         owner = reduce(getattr, owners, importlib.import_module(self.module))
@@ -46,23 +46,23 @@ class Patch:
         return owner, last
 
     def apply(self) -> None:
-        """Put it there, for the rest of this process."""
+        """Replace the name's value for the rest of this process."""
         owner, last = self.place
         setattr(owner, last, self.value)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """What is changed, and on which families of the suite that may show.
+    """A change, and the families of the suite on which it may have an effect.
 
     Attributes
     ----------
     families
         Names of families and the CPU seconds of a run.
     patches, tuning
-        Names in modules that stand for something else, and other values of the tuning.
+        Names in modules with their replacements, and other values of the tuning.
     num_draws
-        How many missions of each family are planned, each with a seed of its own.
+        How many missions of each family are planned, each with its own seed.
     """
 
     families: Mapping[str, float]
@@ -71,14 +71,14 @@ class Change:
     num_draws: int = 2
 
     def apply(self) -> None:
-        """Put all of it in force, for the rest of this process."""
+        """Apply all of it for the rest of this process."""
         for patch in self.patches:
             patch.apply()
         tune(**self.tuning)
 
 
 class _Idle:
-    """Takes the turns of another search without doing anything."""
+    """Take the turns of another search without doing anything."""
 
     steps_beside = 6
 
@@ -90,13 +90,13 @@ class _Idle:
 
 
 def _all_in_turn(turns: Sequence[ActiveStrategy]) -> ActiveStrategy:
-    """Return who has waited longest, whatever the gains."""
+    """Return the strategy that has waited longest, whatever the gains."""
     going = [turn for turn in turns if not turn.is_stalled] or turns
     return max(going, key=lambda turn: turn.num_waits)
 
 
 def _without_noise(search: ResourceWindows, num_moves: float, budget: Budget) -> None:
-    """Make as many moves as with noise."""
+    """Make the same number of moves, without noise."""
     search.make_moves_on_each(TUNING.rounds * num_moves, budget)
 
 
@@ -105,12 +105,12 @@ def _off(module: str, name: str, value: Callable[..., Any]) -> tuple[Patch, ...]
 
 
 def _without(name: str) -> tuple[Patch, ...]:
-    """Leave out a strategy of the list.
+    """Remove a strategy from the list.
 
     Raises
     ------
     ValueError
-        Where there is none of this name.
+        If there is none of this name.
     """
     left = tuple(one for one in every.STRATEGIES if one.name != name)
     if len(left) == len(every.STRATEGIES):
@@ -196,4 +196,4 @@ STRATEGIES: Final[Mapping[str, Change]] = {
         families=_STATIONS | {"weights-fleet-4x2000": 20.0},
     ),
 }
-"""What is left out, or, where the name says so, done in another way."""
+"""What is removed or, if the name says so, done in another way."""

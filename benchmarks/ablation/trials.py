@@ -1,4 +1,4 @@
-"""Cases of the suite with one change each: every one a fork, from one built problem."""
+"""Cases of the suite with one change each: each a fork that starts from the same built problem."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from planner_core.problem import Problem
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial(rows.Row):
-    """One line: a case of the suite and what was changed, ``NOTHING`` for the solver as it is."""
+    """One line: a case of the suite and its change, ``NOTHING`` for the unchanged solver."""
 
     change: str = NOTHING
 
 
 def run(changes: Mapping[str, Change], path: Path, *, anew: bool = False) -> None:
-    """Run what is missing, and the same without a change, and write it down line by line.
+    """Run missing changes and the unchanged solver, and write each line at once.
 
     Parameters
     ----------
     anew
-        Whether what is known of another revision is missing.
+        Whether results of another revision count as missing.
     """
     revision, before = rows.revision(), rows.read(path, Trial)
     plain = {one.case for one in before if not one.change and one.revision == revision}
@@ -71,7 +71,7 @@ def cases_of(change: Change) -> Iterable[Case]:
 
 
 def forked(problem: Problem, case: Case, change: Change | None) -> Result | str:
-    """Return what a changed solver comes to, or how it failed."""
+    """Return a changed solver's result, or how it failed."""
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(target=_answer, args=(theirs, problem, case, change))

@@ -1,8 +1,8 @@
 """Plan and verify AEOSSP cases (``python -m benchmarks.aeossp FOLDER [--time 60] [--out DIR]``).
 
 Prints for each case whether the solution is valid under the benchmark's rules, its weighted
-completion rate (WCR), what the proven bound would allow, completion rate (CR), mean turnaround
-time (TAT), energy used (PC), images dropped for a battery, CPU seconds from the scenario to the
+completion rate (WCR), the upper bound proven for it, completion rate (CR), mean turnaround time
+(TAT), energy used (PC), images dropped because of a battery, CPU seconds from the scenario to the
 solution, and how the search ended ("optimal" is proven with batteries left out).
 FOLDER is one case or holds cases; with ``--out`` each solution is written to CASE/solution.json.
 """

@@ -1,4 +1,4 @@
-"""The battery over the horizon: idle draw always, images and turns on top, charge in sunlight."""
+"""The battery over the horizon: constant idle load, images and slews, charge in sunlight."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _ROUNDING_WH = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """What one satellite's battery went through.
+    """The history of one satellite's battery.
 
     Attributes
     ----------
     used_wh
-        All that was drawn, charging not subtracted.
+        All energy drawn, without subtracting charge.
     lowest_wh
         The lowest level.
     empty_s
-        The middle of the first piece of time that ends below zero, or None.
+        The middle of the first time step that ends below zero, or None.
     """
 
     used_wh: float
@@ -43,10 +43,10 @@ def draw(
     images: Sequence[Observation],
     turns: Sequence[tuple[float, float]],
 ) -> Drawn:
-    """Return what a satellite's actions and its turns to them do to its battery.
+    """Return the effect of a satellite's actions and slews on its battery.
 
-    The horizon is cut at the grid of the battery, and where images and turns begin and end;
-    what holds in the middle of a piece holds for all of it.
+    The horizon is cut at the battery's grid and wherever images and slews begin and end; the
+    state in the middle of a piece holds for all of it.
     """
     satellite = case.satellites[satellite_id]
     image_spans = [(one.start_s, one.end_s) for one in images]

@@ -1,4 +1,4 @@
-"""Cases and solutions as their files hold them; instants are seconds from the horizon's start."""
+"""Cases and solutions as in their files; instants are seconds from the horizon's start."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Case:
     tasks: Mapping[str, Task]
 
     def instant(self, t_s: float) -> datetime:
-        """Return the instant that lies ``t_s`` after the start."""
+        """Return the instant ``t_s`` after the start."""
         return self.start + timedelta(seconds=t_s)
 
 
@@ -135,7 +135,7 @@ def _by_id(items: Iterable[T]) -> dict[str, T]:
 
 
 def _yaml(path: Path) -> Any:
-    # The reader in C takes a tenth of the time; not every build of PyYAML has it.
+    # The C loader takes a tenth of the time; not every build of PyYAML has it.
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     return yaml.load(path.read_bytes(), Loader=loader)
 
@@ -150,7 +150,7 @@ def read_solution(case: Case, path: Path) -> list[Observation]:
     Raises
     ------
     ValueError
-        An action is no observation.
+        If an action is not an observation.
     """
     observations = []
     for number, row in enumerate(json.loads(path.read_text())["actions"]):

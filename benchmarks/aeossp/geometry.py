@@ -1,8 +1,8 @@
-"""Where satellites, targets and the sun are, by the benchmark's conventions and by itself.
+"""Positions of satellites, targets and the sun by the benchmark's conventions, independently.
 
-SGP4 with the constants of WGS84 (the product's are those of WGS72), Earth rotation by GMST 1982
-with UT1 = UTC and no polar motion. All vectors are in the true equator, mean equinox frame
-(TEME), which serves as the inertial one: angles are what counts.
+SGP4 with the WGS84 constants (the product uses those of WGS72), Earth rotation by GMST 1982 with
+UT1 = UTC and no polar motion. All vectors are in the true equator, mean equinox frame (TEME),
+which serves as the inertial frame: only angles matter.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Sky:
         return cls(day, fraction, records)
 
     def satellite(self, satellite_id: str, t_s: Floats) -> Floats:
-        """Return where a satellite is."""
+        """Return a satellite's positions."""
         fraction = self.fraction + t_s / 86400.0
         error, position_km, _ = self.records[satellite_id].sgp4_array(
             np.full_like(fraction, self.day), fraction
@@ -52,12 +52,12 @@ class Sky:
         return np.asarray(position_km * 1000.0)
 
     def target(self, task: Task, t_s: Floats) -> Floats:
-        """Return where a target is."""
+        """Return a target's positions."""
         return self.turned(self.fixed(task), t_s)
 
     @staticmethod
     def fixed(task: Task) -> Floats:
-        """Return where a target is on the turning Earth. Shape ``(3,)``."""
+        """Return a target's Earth-fixed position. Shape ``(3,)``."""
         lat, lon = np.radians(task.lat_deg), np.radians(task.lon_deg)
         squared = _FLATTENING * (2.0 - _FLATTENING)
         normal_m = _EARTH_RADIUS_M / np.sqrt(1.0 - squared * np.sin(lat) ** 2)
@@ -66,7 +66,7 @@ class Sky:
         return np.array([out_m * np.cos(lon), out_m * np.sin(lon), up_m])
 
     def turned(self, fixed: Floats, t_s: Floats) -> Floats:
-        """Return points of the turning Earth, ``(3,)`` or ``(n, 3)``, at instants."""
+        """Return Earth-fixed points, ``(3,)`` or ``(n, 3)``, in TEME at instants."""
         centuries = ((self.day - _J2000) + self.fraction + t_s / 86400.0) / 36525.0
         sidereal_s = (
             67310.54841

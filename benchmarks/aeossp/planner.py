@@ -1,10 +1,10 @@
 """Cases planned with the product: its scenario, its solvers, on the benchmark's action grid.
 
-What the product does not model is met otherwise. The benchmark's geometry differs a little
-(constants of SGP4, Earth orientation): collects that it would refuse are left out of the table,
-and turns are worked out from its lines of sight. Its battery, which idles, slews and charges at
-the same time, is looked at afterwards: where it would run empty, images are dropped, and other
-satellites are searched for room for them.
+Differences of the models are handled here. The benchmark's geometry differs a little (constants of
+SGP4, Earth orientation): collects that it would refuse are removed from the table, and slews are
+computed from its lines of sight. Its battery, which idles, slews and charges at the same time, is
+checked afterwards: if it would run empty, images are dropped, and other satellites are searched
+for room for them.
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ Bools = npt.NDArray[np.bool_]
 
 _WIDER_DEG = 0.2  # than the sensor's limit: the benchmark's own geometry then decides
 _ANGLE_ROUNDING_DEG = 1e-6
-_REPAIR_MOVES = 20.0  # of the window search, for each opportunity
+_REPAIR_MOVES = 20.0  # of the window search, per opportunity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Planned:
-    """A solution and how it came about.
+    """A solution and how it was found.
 
     Attributes
     ----------
     weight, bound
-        Of the tasks observed, and what no solution can exceed whatever its batteries, as long as
-        no image starts sooner than it could be a satellite's first, which begins at nadir.
+        Weight of the observed tasks, and the most of any solution with any batteries, provided
+        no image starts sooner than it could as a satellite's first, which begins at nadir.
     num_collects
-        How many observations there were to choose from.
+        How many collects were available.
     num_dropped
-        Images taken out for a battery; others may have come in their place.
+        Images removed because of a battery; others may have replaced them.
     cpu_s
         From the scenario to the plan.
     """
@@ -80,7 +80,7 @@ def plan_case(case: Case, solver: Solver, *, time_s: float | None, seed: int) ->
     Parameters
     ----------
     time_s
-        For the solver alone; None for no limit.
+        Limit for the solver alone; None for no limit.
     """
     began = time.process_time()
     scenario = scenario_of(case)
@@ -105,7 +105,7 @@ def plan_case(case: Case, solver: Solver, *, time_s: float | None, seed: int) ->
 
 
 def _distinct(problem: Problem, plan: Plan) -> Plan:
-    """Return a plan without images that earn nothing."""
+    """Return the plan without images that earn nothing."""
     timeline = replay(problem, plan)
     assert timeline.is_valid
     positions = sorted(collected.position for collected in timeline.collected.values())
@@ -182,7 +182,7 @@ def _as_the_benchmark_sees_it(case: Case, table: Opportunities) -> Opportunities
         is_allowed[rows] = start_s >= from_nadir_s
         lines["los_start"][rows] = _unit(first)
         lines["los_end"][rows] = _unit(sight(end_s))
-        # All instants are on the grid of the geometry, so its samples are the starts and on.
+        # All instants are on the geometry's grid, so its samples are the starts and what follows.
         step_s = float(case.geometry_step_s)
         for into_s in np.arange(0.0, (end_s - start_s).max(initial=0.0) + step_s, step_s):
             t_s = np.minimum(start_s + into_s, end_s)
@@ -202,10 +202,10 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def _within_battery(case: Case, problem: Problem, plan: Plan, seed: int) -> tuple[Plan, int]:
-    """Return a plan that no battery runs empty under, and how many images it took out for that.
+    """Return a plan under which no battery runs empty, and how many images were removed for that.
 
-    Satellites that run empty lose the images that earn least for their time. What they keep is
-    all they may do from then on, and the others are searched for room for the rest.
+    Satellites that run empty lose the images that earn least for their time. From then on they
+    may only do what they keep; the others are searched for room for the rest.
     """
     taken = [action.opportunity for action in plan.actions]
     is_weak = np.zeros(len(problem.satellites), dtype=np.bool_)
@@ -230,9 +230,9 @@ def _within_battery(case: Case, problem: Problem, plan: Plan, seed: int) -> tupl
 
 
 def _affordable(case: Case, satellite_id: str, problem: Problem, own: list[int]) -> list[int]:
-    """Return the images of one satellite that its battery bears.
+    """Return the images of one satellite for which its battery suffices.
 
-    Fewer images cost no more time to turn between: what is left stays valid.
+    Removing images never makes a slew infeasible: the rest stays valid.
     """
     alone = replace(case, satellites={satellite_id: case.satellites[satellite_id]})
     kept = list(own)

@@ -1,7 +1,7 @@
-"""The benchmark's rules: is a solution valid, and how good is it.
+"""The benchmark's rules: whether a solution is valid, and how good it is.
 
-Written from the rules that the benchmark publishes (README and SPEC of aeossp_standard), with
-geometry of its own: it shares nothing with the planner that it judges.
+Written from the rules that the benchmark publishes (README and SPEC of aeossp_standard), with its
+own geometry: it shares nothing with the planner that it judges.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ANGLE_ROUNDING_DEG = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """A rule that a solution breaks; ``action`` is -1 and ``task_id`` empty where none does."""
+    """A broken rule; ``action`` is -1 and ``task_id`` empty if none is concerned."""
 
     action: int
     satellite_id: str
@@ -33,14 +33,14 @@ class Failure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """What the benchmark says of a solution; the four metrics are zero where it is invalid.
+    """The benchmark's verdict on a solution; its four metrics are zero if it is invalid.
 
     Attributes
     ----------
     completed
-        By completed task: the action that completed it first.
+        For each completed task, the action that completed it first.
     drawn
-        By satellite, what its battery went through.
+        The battery's history of each satellite.
     """
 
     is_valid: bool
@@ -117,7 +117,7 @@ class _Check:
         return False
 
     def fits_rules(self, i: int) -> bool:
-        """Return whether an action is one that its task allows, geometry left out."""
+        """Return whether a task allows an action, ignoring geometry."""
         one, case = self.observations[i], self.case
         satellite, task = case.satellites.get(one.satellite_id), case.tasks.get(one.task_id)
         reason, t_s = "", one.start_s
@@ -142,7 +142,7 @@ class _Check:
         return self._fail(i, "structure", reason, t_s) if reason else True
 
     def is_visible(self, i: int) -> bool:
-        """Return whether the target is seen and within reach at every sample."""
+        """Return whether the target is visible and within the limits at every sample."""
         one = self.observations[i]
         task, satellite = self.case.tasks[one.task_id], self.case.satellites[one.satellite_id]
         step_s = self.case.geometry_step_s
@@ -162,9 +162,9 @@ class _Check:
     def turns(
         self, satellite_id: str, own: list[int]
     ) -> tuple[list[int], list[tuple[float, float]]]:
-        """Return the actions that a satellite reaches in time, and when it turns to them.
+        """Return the actions that a satellite reaches in time, and when it slews to them.
 
-        It looks at nadir at first. What it does not reach it does not do.
+        It points at nadir at first. Actions it does not reach are not executed.
         """
         satellite = self.case.satellites[satellite_id]
         taken: list[int] = []
@@ -204,7 +204,7 @@ class _Check:
         return taken, spans
 
     def note_empty(self, satellite_id: str, drawn: Drawn, reached: Sequence[int]) -> None:
-        """Note when a battery runs empty, and the image that is taken then."""
+        """Record when a battery runs empty, and the image taken at that time."""
         if drawn.empty_s is None:
             return
         during = [

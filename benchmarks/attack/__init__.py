@@ -1,1 +1,1 @@
-"""What other owners notice while one attacks the service (``python -m benchmarks.attack``)."""
+"""How one owner's attack affects other owners (``python -m benchmarks.attack``)."""

@@ -1,9 +1,9 @@
 """Polls, submissions and deliveries of one owner while another one attacks.
 
-Starts ``slewline serve`` with a worker on an empty database (a SQLite file, or the PostgreSQL
-database that is named). Each attack goes on for a while; meanwhile another owner polls, submits
-and is told, each on its own. Prints medians and 99th percentiles, and their ratio to those of
-the same run without an attack.
+Starts ``slewline serve`` with a worker on an empty database (a SQLite file, or the given
+PostgreSQL database). Each attack lasts a while; meanwhile another owner polls, submits and receives
+webhooks, each independently. Prints medians and 99th percentiles, and their ratio to those of the
+same run without an attack.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Times = dict[str, list[float]]
 
 
 class Receiver:
-    """Notes when each message arrived."""
+    """Record when each message arrived."""
 
     def __init__(self) -> None:
         self.arrived = threading.Event()
@@ -91,14 +91,14 @@ def served(database_url: str) -> Iterator[tuple[str, psutil.Process, dict[str, d
 
 
 def post(client: httpx.Client, path: str, body: object) -> str:
-    """Post what must be accepted; return the id of what was made."""
+    """Post a body that must be accepted; return the id of what was created."""
     answer = client.post(path, json=body)
     answer.raise_for_status()
     return str(answer.json()["id"])
 
 
 def scenario(client: httpx.Client, satellite: str, num_targets: int, **fields: Any) -> str:
-    """Store a question about so many targets."""
+    """Store a scenario with this number of targets."""
     targets = [
         {"id": f"t{i}", "lat_deg": -80 + 160 * i / num_targets, "lon_deg": i % 360 - 180}
         for i in range(num_targets)
@@ -109,7 +109,7 @@ def scenario(client: httpx.Client, satellite: str, num_targets: int, **fields: A
 
 
 def aims_of(client: httpx.Client) -> dict[str, Any]:
-    """Store what attacks are aimed at."""
+    """Store what the attacks use as targets."""
     satellite = post(client, "/v1/satellites", {"name": "EYE", "tle": TLE})
     light = scenario(client, satellite, 20)
     return {
@@ -120,7 +120,7 @@ def aims_of(client: httpx.Client) -> dict[str, Any]:
 
 
 def measure(url: str, key: dict[str, str], aims: dict[str, Any], for_s: float) -> Times:
-    """Return the seconds that each kind of call of the victim took, over and over for a while."""
+    """Return the seconds that each kind of the victim's calls took, repeated for a while."""
     receiver = Receiver()
     until_s = time.monotonic() + for_s
     with httpx.Client(base_url=url, headers=key, timeout=300) as client:

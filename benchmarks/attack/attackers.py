@@ -1,4 +1,4 @@
-"""What one owner does to the service, in a process of its own: what it takes is not measured."""
+"""The attacks of one owner, in a process whose own cost is not measured."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ Attack = Callable[[httpx.Client, dict[str, Any]], None]
 
 
 def lists(client: httpx.Client, aims: dict[str, Any]) -> None:
-    """Eighty lists at a time of opportunities that take long to compute."""
+    """Request eighty lists at a time of opportunities that take long to compute."""
     _in_threads(80, lambda: client.get(f"/v1/scenarios/{aims['heavy']}/opportunities"))
 
 
 def webhooks(client: httpx.Client, _aims: dict[str, Any]) -> None:
-    """Twenty webhooks to a receiver that never answers, tested again and again."""
+    """Test twenty webhooks again and again whose receiver never answers."""
     with socket.create_server(("127.0.0.1", 0), backlog=4096) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}/"
         made = [client.post("/v1/webhooks", json={"url": url}).json() for _ in range(20)]
@@ -44,7 +44,7 @@ def webhooks(client: httpx.Client, _aims: dict[str, Any]) -> None:
 
 
 def connections(client: httpx.Client, aims: dict[str, Any]) -> None:
-    """Event streams and half-sent requests, 1,050 of each, opened again when they are closed."""
+    """Open event streams and half-sent requests, 1,050 of each, and reopen those closed."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, min(hard, 4096)), hard))
     key = client.headers["authorization"]
@@ -61,7 +61,7 @@ def connections(client: httpx.Client, aims: dict[str, Any]) -> None:
 
 
 def comparisons(client: httpx.Client, aims: dict[str, Any]) -> None:
-    """Comparisons of 32 runs, as many as are taken and then more."""
+    """Request comparisons of 32 runs, as many as are accepted and then more."""
     body = {"scenario_id": aims["light"], "runs": [{"solver": "rule"}] * 32}
 
     def compare() -> None:
@@ -72,7 +72,7 @@ def comparisons(client: httpx.Client, aims: dict[str, Any]) -> None:
 
 
 def bodies(client: httpx.Client, _aims: dict[str, Any]) -> None:
-    """JSON of 31 MB, and XML with two million attributes."""
+    """Send JSON of 31 MB, and XML with two million attributes."""
     item = '{"id":"t","lat_deg":1,"lon_deg":2,"reward":3},'
     text = '{"name":"N","targets":[' + item * (BODY_BYTES // len(item)) + "{}]}"
     xml = "<omm " + " ".join(f'a{number}=""' for number in range(2_000_000)) + "/>"

@@ -1,1 +1,1 @@
-"""What a forecast of clear skies is worth: plans with and without it under the same weather."""
+"""The value of a clear-sky forecast: plans with and without it under the same weather."""

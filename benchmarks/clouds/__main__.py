@@ -1,4 +1,4 @@
-"""Plans that know a forecast, and plans that do not, under the same 10,000 skies.
+"""Plans made with and without a forecast, judged under the same 10,000 skies.
 
 Run ``python -m benchmarks.clouds [--targets 1000] [--draws 2] [--time-s 60]``.
 """
@@ -45,7 +45,7 @@ def clear_images(problem: Problem, scenario: Scenario, rows: list[int], weather:
 def plan(
     scenario: Scenario, computed: ScenarioOpportunities, weather: Weather, time_s: float
 ) -> tuple[float, str]:
-    """Return the mean of clear images that a plan brings, and a line about it."""
+    """Return the mean number of clear images of a plan, and a line about it."""
     problem = build_problem(scenario, computed, Budget())
     begun = time.process_time()
     solution = Certified(gap=0.01).solve(problem, Budget(time_s=time_s), 0)

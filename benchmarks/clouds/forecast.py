@@ -1,4 +1,4 @@
-"""What a forecast of the synthetic weather says of a mission's targets."""
+"""The forecast of the synthetic weather for a mission's targets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _HOURS: Final = np.arange(25.0)
 
 
 def forecast_of(scenario: Scenario, weather: Weather) -> Forecast:
-    """Return what a forecast says of every target, hour by hour."""
+    """Return the forecast for every target, hour by hour."""
     lat_deg = np.array([target.lat_deg for target in scenario.targets])
     at_km = position_km(lat_deg, np.array([target.lon_deg for target in scenario.targets]))
     hourly = [

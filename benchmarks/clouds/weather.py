@@ -1,8 +1,8 @@
-"""A weather that forecasts half know: where it is clear, how likely, and what comes of it.
+"""Synthetic weather that forecasts know in part: clear skies, their probability, and samples.
 
-The sky over x is clear at t where Z(x, t) is above a threshold, which a climatology by latitude
-sets together with an anomaly of each region. Z is rho F + sqrt(1 - rho^2) E: F is what a forecast
-knows, and E its error. All three are Gaussian fields of exponential covariance.
+The sky over x is clear at t if Z(x, t) is above a threshold, which depends on a climatology by
+latitude and on a regional anomaly. Z is rho F + sqrt(1 - rho^2) E: F is what a forecast knows, and
+E its error. All three are Gaussian fields of exponential covariance.
 """
 
 from __future__ import annotations
@@ -33,17 +33,16 @@ _NORMAL: Final = NormalDist()
 
 
 def position_km(lat_deg: Floats, lon_deg: Floats) -> Floats:
-    """Return places on a sphere. Shape ``(n, 3)``."""
+    """Return positions on a sphere. Shape ``(n, 3)``."""
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
     unit = [np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)]
     return _EARTH_KM * np.column_stack(unit)
 
 
 class _Field:
-    """A Gaussian field whose covariance falls with exp(-distance), by random Fourier features.
+    """A Gaussian field whose covariance falls as exp(-distance), by random Fourier features.
 
-    The spectrum of that covariance is a multivariate Cauchy distribution, in any number of
-    dimensions.
+    The spectrum of that covariance is a multivariate Cauchy distribution, in any dimension.
     """
 
     def __init__(self, draw: np.random.Generator, dimensions: int):
@@ -52,7 +51,7 @@ class _Field:
         self._phase = draw.uniform(0.0, 2.0 * np.pi, _FEATURES)
 
     def at(self, points: Floats) -> Floats:
-        """Return the values at points, given in lengths of correlation. Shape ``(n,)``."""
+        """Return the values at points, given in correlation lengths. Shape ``(n,)``."""
         waves = np.cos(points @ self._frequency.T + self._phase)
         values: Floats = np.sqrt(2.0 / _FEATURES) * waves.sum(axis=1)
         return values
@@ -60,7 +59,7 @@ class _Field:
 
 @dataclass(frozen=True, slots=True)
 class Sites:
-    """Where and when: positions, latitudes and hours from the start. ``n`` each."""
+    """Positions, latitudes and hours from the start. ``n`` each."""
 
     at_km: Floats
     lat_deg: Floats
@@ -68,7 +67,7 @@ class Sites:
 
 
 class Weather:
-    """One draw of regions and of what a forecast knows."""
+    """One draw of the regional anomalies and of the part that a forecast knows."""
 
     def __init__(self, seed: int):
         draw = np.random.default_rng(seed)
@@ -76,7 +75,7 @@ class Weather:
         self._known = [_Field(draw, 4) for _ in _SCALES]
 
     def clear_probability(self, sites: Sites) -> Floats:
-        """Return what a forecast made at the start says."""
+        """Return the forecast made at the start."""
         skill = _skill(sites.at_h)
         edge = skill * self._forecast(sites) - self._threshold(sites)
         return np.array([_NORMAL.cdf(z) for z in (edge / np.sqrt(1.0 - skill**2)).tolist()])
@@ -84,7 +83,7 @@ class Weather:
     def samples(
         self, sites: Sites, number: int, draw: np.random.Generator
     ) -> npt.NDArray[np.bool_]:
-        """Return whether each of some places is clear, in skies drawn. Shape ``(number, n)``."""
+        """Return whether each of some sites is clear, in drawn skies. Shape ``(number, n)``."""
         skill = _skill(sites.at_h)
         scaled = np.column_stack([sites.at_km / _ERROR_KM, sites.at_h / _ERROR_H])
         away = np.linalg.norm(scaled[:, np.newaxis] - scaled[np.newaxis], axis=2)

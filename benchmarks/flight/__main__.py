@@ -1,4 +1,4 @@
-"""Fly a timeline in Basilisk, and print what became of it.
+"""Fly a timeline in Basilisk, and print the result.
 
 ``python -m benchmarks.flight SCENARIO.json TIMELINE.json`` takes the two files that the demo and
 ``slewline solve`` write, flies every satellite of them, and prints a table for each. With
@@ -21,7 +21,7 @@ from benchmarks.flight.report import is_flyable, lines
 
 
 def main() -> None:
-    """Do what the command line asks for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.flight", description=__doc__)
     parser.add_argument("scenario", type=Path)
     parser.add_argument("timeline", type=Path)

@@ -1,7 +1,7 @@
 """The flight itself, in Basilisk: a rigid body on four reaction wheels that follows the reference.
 
-Perfect sensors, no flexible modes. The wheels have the torque for the plan's acceleration about
-whatever axis needs most of it, and a quarter more. Eclipses are Basilisk's, with penumbra.
+Perfect sensors, no flexible modes. The wheels have 1.25 times the torque that the plan's
+acceleration needs about the most demanding axis. Eclipses are Basilisk's, with penumbra.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def fly(mission: Mission, reference: Reference, limits: Limits) -> Flight:
     shadow.addPlanetToModel(play.earth)
     shadow.addSpacecraftToModel(play.site)
     recorder = _Recorder(body, shadow, motors, len(told))
-    # One after another in each step: first what moved, then what is to be done about it.
+    # In this order in each step: first the motion, then the control's reaction to it.
     for rank, model in enumerate(
         (play, effector, body, sensor, error, feedback, motors, shadow, recorder)
     ):
@@ -82,7 +82,7 @@ def _wheels(body: Any, limits: Limits) -> tuple[Any, Any, float]:
     along = 1.0 / np.sqrt(3.0)
     axes = [[x, y, along] for x, y in ((along, along), (-along, along), (-along, -along),
                                        (along, -along))]  # fmt: skip
-    # Each wheel gives its share of the torque about each of the body's axes, all at once.
+    # Each wheel contributes to the torque about each of the body's axes at the same time.
     most = float(np.linalg.norm(_INERTIA_KG_M2)) * limits.acceleration
     torque_n_m = _TORQUE_RESERVE * most / (4.0 * along)
     factory = simIncludeRW.rwFactory()
@@ -94,7 +94,7 @@ def _wheels(body: Any, limits: Limits) -> tuple[Any, Any, float]:
 
 
 def _control(sensor: Any, wheels: Any, effector: Any, play: _Playback) -> tuple[Any, Any, Any]:
-    """Return what compares, what asks for a torque, and what shares it among the wheels."""
+    """Return the modules that measure the error, command a torque and allot it to the wheels."""
     error = attTrackingError.attTrackingError()
     error.attNavInMsg.subscribeTo(sensor.attOutMsg)
     error.attRefInMsg.subscribeTo(play.reference)
@@ -111,12 +111,12 @@ def _control(sensor: Any, wheels: Any, effector: Any, play: _Playback) -> tuple[
     motors.controlAxes_B = np.eye(3).ravel().tolist()
     motors.rwParamsInMsg.subscribeTo(wheels)
     motors.vehControlInMsg.subscribeTo(feedback.cmdTorqueOutMsg)
-    play.wheels = wheels  # a message lives as long as somebody holds it
+    play.wheels = wheels  # a message lives only while something references it
     return error, feedback, motors
 
 
 class _Playback(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no types
-    """Tells, step by step, the attitude to have, and where satellite and sun are."""
+    """Publishes the wanted attitude and the positions of satellite and sun, step by step."""
 
     def __init__(self, mission: Mission, reference: Reference, told: Floats) -> None:
         super().__init__()
@@ -132,11 +132,11 @@ class _Playback(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
         self.wheels: Any = None
 
     def Reset(self, now_ns: int) -> None:  # noqa: N802  # Basilisk calls it so
-        """Say what holds at the beginning."""
+        """Publish the initial state."""
         self.UpdateState(now_ns)
 
     def UpdateState(self, now_ns: int) -> None:  # noqa: N802  # likewise
-        """Say what holds at an instant."""
+        """Publish the state at an instant."""
         row = min(now_ns // _STEP_NS, len(self._told) - 1)
         wanted = messaging.AttRefMsgPayload()
         wanted.sigma_RN = self._told[row].tolist()
@@ -154,7 +154,7 @@ class _Playback(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
 
 
 class _Recorder(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no types
-    """Keeps what is judged, and nothing else: a day has 864,001 steps."""
+    """Keeps only what is judged: a day has 864,001 steps."""
 
     def __init__(self, body: Any, shadow: Any, motors: Any, num_steps: int) -> None:
         super().__init__()
@@ -165,10 +165,10 @@ class _Recorder(sysModel.SysModel):  # type: ignore[misc]  # Basilisk has no typ
         self.most_torque_n_m = 0.0
 
     def Reset(self, now_ns: int) -> None:  # noqa: N802  # Basilisk calls it so
-        """Begin with nothing kept."""
+        """Start with empty records."""
 
     def UpdateState(self, now_ns: int) -> None:  # noqa: N802  # likewise
-        """Keep what there is at an instant."""
+        """Record the state at an instant."""
         row = min(now_ns // _STEP_NS, len(self.lit) - 1)
         state = self._body.scStateOutMsg.read()
         self.attitude[row], self.rate[row] = state.sigma_BN, state.omega_BN_B

@@ -1,4 +1,4 @@
-"""What a flight says of a plan: pointing, contacts, battery and recorder."""
+"""The verdict of a flight on a plan: pointing, contacts, battery and recorder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks.flight.reference import STEP_S, Flight, Reference
 from benchmarks.flight.world import elevation_deg, line_of_sight, orbit, satellite_km, sun_km
 
 ON_TARGET_DEG: Final = 0.1
-_SUN_EVERY: Final = 600  # steps between which the sun's direction is taken as the same
+_SUN_EVERY: Final = 600  # steps for which the sun's direction is taken as constant
 
 Bools = npt.NDArray[np.bool_]
 
@@ -26,7 +26,7 @@ class Pointing:
     Attributes
     ----------
     late_s
-        Until the last instant off target, from the start; 0 where it never was.
+        From the start to the last instant off target; 0 if it never was.
     """
 
     task: Task
@@ -39,20 +39,20 @@ class Pointing:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a satellite's flight came to.
+    """The result of a satellite's flight.
 
     Attributes
     ----------
     below_curve
-        How far the flown battery was below the timeline's curve at most, of the capacity.
+        The most that the flown battery was below the timeline's curve, as a share of capacity.
     recorder_error
-        Greatest difference of the recorder, integrated again, from the timeline's curve.
+        Greatest difference between the recorder, integrated again, and the timeline's curve.
     nearest_sun_deg
         Least angle between boresight and sun.
     incidence
-        Mean cosine of the sun on the panels, by what the satellite was doing.
+        Mean cosine of the sun's incidence on the panels, for each activity of the satellite.
     charged
-        Capacities charged, by what is counted.
+        Capacities charged, for each way of counting.
     """
 
     mission: Mission
@@ -74,7 +74,7 @@ class Verdict:
 
 
 def judge(mission: Mission, reference: Reference, flight: Flight) -> Verdict:
-    """Return what the flight says of the plan."""
+    """Return the flight's verdict on the plan."""
     times_s = STEP_S * np.arange(len(flight.lit), dtype=np.float64)
     doing = _doing(mission, reference, times_s)
     from_sun_deg = _from_sun_deg(mission, flight)
@@ -119,14 +119,14 @@ def _pointing(mission: Mission, flight: Flight, times_s: Floats) -> Iterable[Poi
                 lowest_deg, elevation_deg(where, task.site.ecef_km, task.site.up, times_s[row])
             )
         is_off = off_deg > ON_TARGET_DEG
-        # Until the step after the last one off target.
+        # Up to the step after the last one off target.
         late_s = STEP_S * (float(np.flatnonzero(is_off)[-1]) + 1.0) if is_off.any() else 0.0
         yield Pointing(task, not is_off[0], not is_off.any(), late_s, float(off_deg.max()),
                        lowest_deg)  # fmt: skip
 
 
 def _doing(mission: Mission, reference: Reference, times_s: Floats) -> dict[str, Bools]:
-    """Return when the satellite was doing what."""
+    """Return when the satellite had which activity."""
     doing = {
         mode: _within(times_s, ((t.start_s, t.end_s) for t in mission.tasks if t.mode == mode))
         for mode in ("collect", "contact")
@@ -157,7 +157,7 @@ def _from_sun_deg(mission: Mission, flight: Flight) -> Floats:
 
 
 def _incidence(mission: Mission, from_sun_deg: Floats) -> Floats:
-    """Return the cosine of the sun on panels that turn freely about the boresight."""
+    """Return the cosine of the sun's incidence on panels that turn freely about the boresight."""
     panel_deg = 180.0 if mission.power is None else mission.power.panel_angle_deg
     incidence: Floats = np.maximum(0.0, np.cos(np.radians(from_sun_deg - panel_deg)))
     return incidence
@@ -177,7 +177,7 @@ def _battery(power: Power, sunshine: Floats, doing: dict[str, Bools]) -> Floats:
 def _charged(
     power: Power, lit: Floats, towards_sun: Floats, doing: dict[str, Bools]
 ) -> dict[str, float]:
-    """Return the capacities charged, one assumption undone after the other."""
+    """Return the capacities charged, as assumptions are removed one after the other."""
     idle = ~(doing["collect"] | doing["contact"])
     counted = {
         "in all idle time": idle.astype(np.float64),
@@ -190,7 +190,7 @@ def _charged(
 
 
 def _recorder(mission: Mission, data: Data, times_s: Floats) -> Floats:
-    """Return what the recorder holds, with what comes down by the elevation of each instant."""
+    """Return the recorder's level, with the downlink rate at each instant's elevation."""
     where = orbit(mission)
     change = np.full(len(times_s), data.telemetry_per_s * STEP_S)
     for task in mission.tasks:
@@ -215,7 +215,7 @@ def _overlap_s(times_s: Floats, from_s: float, to_s: float) -> Floats:
 
 
 def _capped(initial: float, change: Floats, least: float, most: float) -> Floats:
-    """Return a running sum that stays within limits. The change of a step shows at the next."""
+    """Return a running sum kept within limits. A step's change appears at the next step."""
     held = np.empty(len(change))
     now = initial
     for row, amount in enumerate(change.tolist()):

@@ -1,4 +1,4 @@
-"""What a scenario file and a timeline say, as far as one satellite flies it."""
+"""What a scenario file and a timeline say about one satellite's flight."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Site:
     Attributes
     ----------
     ecef_km
-        Where it is, Earth-fixed. Shape ``(3,)``.
+        Earth-fixed position. Shape ``(3,)``.
     up
         The ellipsoid's normal. Shape ``(3,)``.
     """
@@ -40,14 +40,14 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A ground station, and what a contact with it takes down.
+    """A ground station, and the downlink of a contact with it.
 
     Attributes
     ----------
     setup_s
-        Of each contact, in which nothing comes down.
+        At the start of each contact, without downlink.
     gain
-        Factor on the downlink's rate.
+        Factor on the downlink rate.
     """
 
     site: Site
@@ -77,12 +77,12 @@ class SunVisit:
 
 @dataclass(frozen=True, slots=True)
 class Agility:
-    """How fast the satellite turns.
+    """How fast the satellite slews.
 
     Attributes
     ----------
     settle_s
-        How long before a task its line of sight is to be reached.
+        How long before a task its line of sight must be reached.
     sun_exclusion_deg
         Least angle between boresight and sun at any time; 0 for none.
     """
@@ -107,7 +107,7 @@ class Power:
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """Shares of the recorder per second; the downlink's by elevation."""
+    """Shares of the recorder per second; the downlink's depend on elevation."""
 
     collect_per_s: float
     telemetry_per_s: float
@@ -118,7 +118,7 @@ class Data:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Battery and recorder as the timeline foretells them."""
+    """Battery and recorder as the timeline predicts them."""
 
     time_s: Floats
     battery: Floats
@@ -127,17 +127,17 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """One satellite's plan, and all that flying it needs.
+    """One satellite's plan, and all that is needed to fly it.
 
     Attributes
     ----------
     tasks
-        In the order of time.
+        In order of time.
     visits
-        None where the timeline does not say when the satellite is at the sun: in the paper's
-        model it charges in all idle time, and no visit takes a turn.
+        None if the timeline does not say when the satellite points at the sun: in the paper's
+        model it charges in all idle time, and no visit takes a slew.
     curve, power, data
-        None where the plan was made without resources.
+        None if the plan was made without resources.
     """
 
     name: str
@@ -263,7 +263,7 @@ def _elements(satellite: Json) -> Satrec:
     elements = Satrec()
     fields = {key: "" if value is None else str(value) for key, value in satellite["omm"].items()}
     epoch = fields["EPOCH"].removesuffix("Z")
-    fields["EPOCH"] = epoch if "." in epoch else f"{epoch}.0"  # as the library wants it
+    fields["EPOCH"] = epoch if "." in epoch else f"{epoch}.0"  # the library's format
     omm.initialize(elements, fields)
     return elements
 

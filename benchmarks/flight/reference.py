@@ -1,9 +1,9 @@
-"""The attitude that the satellite is told to have, ten times a second.
+"""The attitude that the satellite is commanded to have, ten times a second.
 
-Between tasks it turns as its limits of rate and acceleration allow: a burst from the rate of the
-line of sight that it leaves, a coast, and a burst to the rate of the one it comes to, each about
-an axis of its own. Where the plan leaves too little time for that, it arrives late, as a real
-satellite would. While it tracks, it does not roll about the boresight.
+Between tasks it slews within its limits of rate and acceleration: a burst from the rate of the
+line of sight that it leaves, a coast, and a burst to the rate of the next one, each about an axis
+of its own. If the plan leaves too little time for that, it arrives late, as a real satellite
+would. While it tracks, it does not roll about the boresight.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from benchmarks.flight.rotations import (
 from benchmarks.flight.world import line_of_sight, orbit, sun_km
 
 STEP_S: Final = 0.1
-_LATEST_S: Final = 600.0  # after which a turn that is possible at all has ended
-_STRONG_WHEELS_DEG_S2: Final = 0.5  # where the plan knows no limit
+_LATEST_S: Final = 600.0  # by which every slew that is possible at all has ended
+_STRONG_WHEELS_DEG_S2: Final = 0.5  # if the plan has no limit
 
-# Where a line of sight is, and the rate at which it turns, at an instant in seconds.
+# Direction of a line of sight and its rate of turn, at an instant in seconds.
 Goal = Callable[[float], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How fast the satellite may turn and speed up, rad/s and rad/s2."""
+    """Limits of the satellite's rate and acceleration, rad/s and rad/s2."""
 
     rate: float
     acceleration: float
@@ -55,9 +55,9 @@ class Reference:
     rate, acceleration
         rad/s and rad/s2. Shape ``(n, 3)``.
     too_short
-        Tasks before which the plan leaves less time than the turn needs, by name.
+        Names of tasks before which the plan leaves less time than the slew needs.
     visits
-        When it is at the sun: from and to, in seconds.
+        Start and end of each visit to the sun, in seconds.
     """
 
     attitude: Floats
@@ -69,7 +69,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """What came of a reference, at the same steps.
+    """The flight of a reference, at the same steps.
 
     Attributes
     ----------
@@ -78,9 +78,9 @@ class Flight:
     rate_deg_s
         How fast the body turned. Shape ``(n,)``.
     lit
-        Share of the sun's disc that is seen. Shape ``(n,)``.
+        Visible share of the sun's disc. Shape ``(n,)``.
     torque_share
-        Greatest torque asked of a wheel, of what it can give.
+        Greatest torque commanded of a wheel, relative to its maximum.
     """
 
     boresight: Floats
@@ -90,7 +90,7 @@ class Flight:
 
 
 def limits_of(agility: Agility, acceleration_deg_s2: float | None) -> Limits:
-    """Return what to fly with: an acceleration asked for, the plan's own, or strong wheels."""
+    """Return the limits to fly with: a given acceleration, the plan's own, or strong wheels'."""
     chosen = acceleration_deg_s2 or agility.acceleration_deg_s2 or _STRONG_WHEELS_DEG_S2
     return Limits(math.radians(agility.rate_deg_s), math.radians(chosen))
 
@@ -122,14 +122,14 @@ class Pilot:
             self._between(task.start_s, task)
             self._track(task)
         self._between(self._mission.duration_s, None)
-        # A command holds until the next step: over it, the rate has to come to the next one.
+        # A command holds until the next step: during it the rate must reach the next one.
         acceleration = np.diff(self._rate, axis=0, append=self._rate[-1:]) / STEP_S
         return Reference(self._attitude, self._rate, acceleration, self._too_short, self._visits)
 
     # From one task to the next ----------------------------------------------------------------
 
     def _between(self, until_s: float, task: Task | None) -> None:
-        """Go on until a task begins, by way of the sun where the plan has it so."""
+        """Continue until a task begins, by way of the sun if the plan says so."""
         for from_s, to_s in self._sun_spans(until_s, task):
             self._to_sun(from_s)
             leaves_s = max(self._now_s, to_s)
@@ -152,7 +152,7 @@ class Pilot:
         arrives_s = self._now_s + self._least_s(self._sun_goal, self._now_s)
         if task is None:
             return [(arrives_s, until_s)] if arrives_s < until_s else []
-        # As the turn back takes about as long from wherever the sun is seen, measure it there.
+        # The slew back takes about as long from any sun-pointing attitude, so measure it there.
         pose, spin, now_s = self._pose, self._spin, self._now_s
         direction = self._sunward(arrives_s, self._boresight)
         self._pose, self._spin = facing(direction, pose), np.zeros(3)
@@ -162,11 +162,11 @@ class Pilot:
         return [(arrives_s, leaves_s)] if arrives_s < leaves_s else []
 
     def _to_sun(self, wanted_s: float) -> None:
-        """Turn to the sun, to be there at an instant, or as soon after it as can be."""
+        """Slew to the sun, to arrive at an instant or as soon as possible after it."""
         self._turn(self._sun_goal, wanted_s)
 
     def _to_task(self, task: Task) -> None:
-        """Turn to where the task's line of sight will be, in time for it or as soon as can be."""
+        """Slew to the task's future line of sight, in time for it or as soon as possible."""
         goal = self._goal(task)
         early_s = task.start_s - self._mission.agility.settle_s
         for wanted_s in (early_s, task.start_s):
@@ -192,17 +192,17 @@ class Pilot:
         self._now_s = max(task.end_s, self._now_s)
 
     def _rest(self, until_s: float) -> None:
-        """Stay as it is; a satellite that still turns comes to rest first."""
+        """Hold the attitude; a satellite that is still turning comes to rest first."""
         if until_s <= self._now_s:
             return
-        # The turn that comes to rest and stays so.
+        # A slew that comes to rest and stays there.
         brake_s = max(until_s, self._now_s + norm(self._spin) / self._limits.acceleration)
         self._draw(np.zeros(3), np.zeros(3), until_s, brake_s)
 
     # Turns ------------------------------------------------------------------------------------
 
     def _turn(self, goal: Goal, wanted_s: float) -> None:
-        """Turn, to be there at an instant, or as soon after it as can be."""
+        """Slew, to arrive at an instant or as soon as possible after it."""
         at_s = wanted_s
         found = self._cruise(goal, at_s) if at_s > self._now_s else None
         if found is None:
@@ -213,7 +213,7 @@ class Pilot:
         self._follow(found, at_s, goal)
 
     def _later_s(self, goal: Goal, from_s: float) -> float:
-        """Return how much later than an instant a turn can end."""
+        """Return how much later than an instant a slew can end."""
         step_s, later_s = 0.25, 0.0
         while self._cruise(goal, from_s + later_s) is None and later_s < _LATEST_S:
             later_s += step_s
@@ -224,11 +224,11 @@ class Pilot:
         return later_s
 
     def _least_s(self, goal: Goal, from_s: float) -> float:
-        """Return how long the quickest turn takes from here."""
+        """Return how long the quickest slew takes from here."""
         return self._later_s(goal, from_s + STEP_S) + STEP_S
 
     def _least_back_s(self, task: Task) -> float:
-        """Return how long before a task the satellite, at rest, has to begin its turn."""
+        """Return how long before a task the satellite, at rest, has to begin its slew."""
         goal, low_s, high_s = self._goal(task), 0.0, 1.0
         while self._is_possible(goal, task.start_s, high_s) is False and high_s < _LATEST_S:
             low_s, high_s = high_s, 1.5 * high_s
@@ -245,12 +245,12 @@ class Pilot:
         return self._cruise(goal, at_s) is not None
 
     def _cruise(self, goal: Goal, at_s: float) -> Floats | None:
-        """Return the rate of the coast of a turn that ends at an instant; None if there is none."""
+        """Return the coast rate of a slew that ends at an instant; None if there is none."""
         takes_s = at_s - self._now_s
         if takes_s <= 0.0:
             return None
         direction, spin = goal(at_s)
-        # A rate that the lines of sight themselves have is no fault of the turn.
+        # A rate that the lines of sight themselves have does not count against the slew.
         most = max(self._limits.rate, norm(self._spin), norm(spin)) * (1.0 + 1e-9)
         if norm(between(self._boresight, direction)) > most * takes_s:
             return None
@@ -262,13 +262,13 @@ class Pilot:
         return cruise if is_right else None
 
     def _follow(self, cruise: Floats, at_s: float, goal: Goal) -> None:
-        """Draw a turn, and be at its end."""
+        """Write a whole slew, and move to its end."""
         direction, spin = goal(at_s)
         self._draw(cruise, spin, at_s, at_s)
         self._pose = facing(direction, self._pose)
 
     def _draw(self, cruise: Floats, spin: Floats, until_s: float, ends_s: float) -> None:
-        """Write a turn that ends at an instant, as far as another, and be there."""
+        """Write a slew that ends at one instant up to another instant, and move there."""
         first, last = self._steps(self._now_s, until_s)
         self._pose = draw(
             self._pose, self._spin, cruise, spin, np.array([self._now_s, ends_s]),
@@ -298,7 +298,7 @@ class Pilot:
         return self._sunward(time_s, self._boresight), np.zeros(3)
 
     def _sunward(self, time_s: float, boresight: Floats) -> Floats:
-        """Return where the boresight points while the panels face the sun, the nearest to it.
+        """Return the nearest boresight direction with the panels facing the sun.
 
         The panels stand at a fixed angle to the boresight, and turn freely about it.
         """

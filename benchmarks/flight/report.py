@@ -1,4 +1,4 @@
-"""What is printed of a flight, and when a plan counts as flyable."""
+"""The printed report of a flight, and when a plan counts as flyable."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def lines(verdict: Verdict) -> Iterator[str]:
 
 
 def is_flyable(verdict: Verdict, share: float) -> bool:
-    """Return whether that share of the collects was on target, and all else as foretold."""
+    """Return whether that share of the collects was on target, and all else as predicted."""
     return (
         verdict.share("collect") >= share
         and verdict.share("contact") == 1.0

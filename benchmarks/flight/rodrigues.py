@@ -8,7 +8,7 @@ from benchmarks.flight.mission import Floats
 
 
 def parameters(attitude: Floats) -> Floats:
-    """Return the parameters of poses, of the rotation by at most 180 degrees.
+    """Return the parameters of attitudes, for the rotation by at most 180 degrees.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def parameters(attitude: Floats) -> Floats:
     """
     trace = np.trace(attitude, axis1=1, axis2=2)
     squares = np.column_stack([trace, *(attitude[:, i, i] for i in range(3))])
-    # Sheppard's way: divide by the greatest of the four Euler parameters.
+    # Sheppard's method: divide by the greatest of the four Euler parameters.
     euler = np.empty((len(attitude), 4))
     greatest = squares.argmax(axis=1)
     pairs = [(2, 1), (0, 2), (1, 0)]

@@ -1,4 +1,4 @@
-"""Rotations in three dimensions: turns of burst, coast and burst, and tracking without roll.
+"""Rotations in three dimensions: slews of burst, coast and burst, and tracking without roll.
 
 A pose is a matrix whose columns are the body's axes in the inertial frame; the boresight is the
 third. Rates are vectors of the inertial frame, rad/s.
@@ -16,11 +16,11 @@ from benchmarks.flight.mission import Floats
 from benchmarks.flight.world import line_of_sight
 
 BORESIGHT: Final = 2
-_BURST_STEPS: Final = 24  # in which the end of a turn is worked out
+_BURST_STEPS: Final = 24  # in which the end of a slew is computed
 _ROUNDS: Final = 15
 _EXACT_RAD: Final = 1e-7
 _SMALL: Final = 1e-12
-_NUDGE_RAD_S: Final = 1e-6  # to see how the end of a turn depends on its coast
+_NUDGE_RAD_S: Final = 1e-6  # to find the derivative of a slew's end with respect to its coast
 
 
 @numba.njit(cache=True)
@@ -31,7 +31,7 @@ def norm(vector: Floats) -> float:
 
 @numba.njit(cache=True)
 def turned(pose: Floats, rotation: Floats) -> Floats:
-    """Return a pose after a rotation about the direction of a vector, by its length in rad."""
+    """Return a pose rotated about a vector's direction, by its length in rad."""
     angle = norm(rotation)
     if angle < _SMALL:
         return pose.copy()
@@ -50,19 +50,19 @@ def between(direction: Floats, other: Floats) -> Floats:
     across = np.cross(direction, other)
     sine, cosine = norm(across), (direction * other).sum()
     if sine < _SMALL:
-        return across  # the same; opposite ones are never met here
+        return across  # the same; opposite ones never occur here
     return across * (math.atan2(sine, cosine) / sine)
 
 
 @numba.njit(cache=True)
 def facing(direction: Floats, pose: Floats) -> Floats:
-    """Return the pose nearest to another whose boresight has a direction."""
+    """Return the pose with a given boresight that is nearest to another pose."""
     return turned(pose, between(np.ascontiguousarray(pose[:, BORESIGHT]), direction))
 
 
 @numba.njit(cache=True)
 def bursts_s(spin: Floats, cruise: Floats, end_spin: Floats, acceleration: float) -> Any:
-    """Return how long the two bursts of a turn take."""
+    """Return how long the two bursts of a slew take."""
     return norm(cruise - spin) / acceleration, norm(end_spin - cruise) / acceleration
 
 
@@ -71,7 +71,7 @@ def _end(
     pose: Floats, spin: Floats, cruise: Floats, end_spin: Floats, takes_s: float,
     acceleration: float,
 ) -> Floats:  # fmt: skip
-    """Return the pose in which a turn ends."""
+    """Return the pose in which a slew ends."""
     first_s, last_s = bursts_s(spin, cruise, end_spin, acceleration)
     for step in range(_BURST_STEPS):
         rate = spin + (cruise - spin) * ((step + 0.5) / _BURST_STEPS)
@@ -88,10 +88,10 @@ def solve(
     pose: Floats, spin: Floats, direction: Floats, end_spin: Floats, takes_s: float,
     acceleration: float,
 ) -> Any:  # fmt: skip
-    """Find the coast of a turn of a given length between moving lines of sight.
+    """Find the coast of a slew of a given duration between moving lines of sight.
 
-    By Newton's method: of the rates that bring the boresight where it is to be, the change of
-    least length, since the rotation about the boresight is free.
+    By Newton's method: of the rates that bring the boresight to its goal, each step takes the one
+    of least change, since the rotation about the boresight is free.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def solve(
         size = norm(error)
         if size < _EXACT_RAD:
             return True, cruise
-        # Along two axes across the boresight; the third cannot be off.
+        # Along two axes across the boresight; about the third there is no error.
         one = _across(direction)
         other = np.cross(direction, one)
         slope_one, slope_other = np.empty(3), np.empty(3)
@@ -130,7 +130,7 @@ def solve(
 
 @numba.njit(cache=True)
 def _across(direction: Floats) -> Floats:
-    """Return some direction across another."""
+    """Return some direction perpendicular to another."""
     axis = np.zeros(3)
     axis[np.argmin(np.abs(direction))] = 1.0
     across = np.cross(direction, axis)
@@ -139,7 +139,7 @@ def _across(direction: Floats) -> Floats:
 
 @numba.njit(cache=True)
 def _least_change(one: Floats, other: Floats, wanted_one: float, wanted_other: float) -> Floats:
-    """Return the shortest vector whose products with two others are given."""
+    """Return the shortest vector with the given scalar products with two others."""
     a, b, c = (one * one).sum(), (one * other).sum(), (other * other).sum()
     square = max(a * c - b * b, 1e-9 * a * c)
     x = (c * wanted_one - b * wanted_other) / square
@@ -153,7 +153,7 @@ def _error(
     pose: Floats, spin: Floats, cruise: Floats, end_spin: Floats, takes_s: float,
     acceleration: float, direction: Floats,
 ) -> Floats:  # fmt: skip
-    """Return the rotation that a turn's last boresight is off by, from where it is to be."""
+    """Return the rotation from the wanted boresight to the one at the slew's end."""
     end = _end(pose, spin, cruise, end_spin, takes_s, acceleration)
     return between(direction, np.ascontiguousarray(end[:, BORESIGHT]))
 
@@ -163,7 +163,7 @@ def draw(
     pose: Floats, spin: Floats, cruise: Floats, end_spin: Floats, span_s: Floats,
     acceleration: float, step_s: float, first: int, poses: Floats, rates: Floats,
 ) -> Floats:  # fmt: skip
-    """Write a turn's poses and rates at even steps; return the pose at its end.
+    """Write a slew's poses and rates at even steps; return the pose at its end.
 
     Parameters
     ----------

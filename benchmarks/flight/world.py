@@ -1,4 +1,4 @@
-"""Where satellite, sites and sun are, in SGP4's own frame (TEME), by formulas of its own.
+"""Positions of satellite, sites and sun in SGP4's own frame (TEME), by independent formulas.
 
 Earth turns by GMST of 1982, without polar motion and with UT1 = UTC (together below 0.002 deg);
 the sun is the Astronomical Almanac's low-precision one (0.01 deg).
@@ -17,11 +17,11 @@ from benchmarks.flight.mission import Floats, Mission
 
 EARTH_RATE_RAD_S: Final = 7.2921158553e-5
 AU_KM: Final = 149_597_870.7
-_STEP_S: Final = 10.0  # between calls of SGP4; cubic in between, 0.3 m off at most
+_STEP_S: Final = 10.0  # between calls of SGP4; cubic in between, at most 0.3 m off
 
 
 class Orbit(NamedTuple):
-    """SGP4's states at even steps, and how far the Earth has turned at the first.
+    """SGP4's states at even steps, and the Earth's rotation angle at the first.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def satellite_km(where: Any, time_s: float) -> tuple[Floats, Floats]:
 
 @numba.njit(cache=True)
 def site_km(where: Any, ecef_km: Floats, time_s: float) -> Floats:
-    """Return where an Earth-fixed point, or direction, is in TEME."""
+    """Return an Earth-fixed point or direction in TEME."""
     angle = where.gmst_rad + EARTH_RATE_RAD_S * time_s
     c, s = math.cos(angle), math.sin(angle)
     x, y, z = ecef_km
@@ -104,7 +104,7 @@ def site_km(where: Any, ecef_km: Floats, time_s: float) -> Floats:
 
 @numba.njit(cache=True)
 def line_of_sight(where: Any, ecef_km: Floats, time_s: float) -> tuple[Floats, Floats]:
-    """Return the direction from satellite to site, and the rate at which it turns, rad/s."""
+    """Return the direction from satellite to site, and its rate of turn, rad/s."""
     position, velocity = satellite_km(where, time_s)
     site = site_km(where, ecef_km, time_s)
     site_velocity = EARTH_RATE_RAD_S * np.array([-site[1], site[0], 0.0])
@@ -115,7 +115,7 @@ def line_of_sight(where: Any, ecef_km: Floats, time_s: float) -> tuple[Floats, F
 
 @numba.njit(cache=True)
 def elevation_deg(where: Any, ecef_km: Floats, up: Floats, time_s: float) -> float:
-    """Return how high the satellite stands above a site's horizon."""
+    """Return the satellite's elevation above a site's horizon."""
     direction, _ = line_of_sight(where, ecef_km, time_s)
     height = -(direction * site_km(where, up, time_s)).sum()
     return math.degrees(math.asin(min(1.0, max(-1.0, height))))

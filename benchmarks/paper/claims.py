@@ -1,4 +1,4 @@
-"""What the paper says, held against what was measured."""
+"""The paper's statements, compared with the measurements."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Claim:
     verdict
         Under the study's own reading.
     near
-        Under the reading that comes nearest to the paper's number, or for an order of methods
-        under the one nearest to all four; None where no other reading was tried.
+        Under the reading closest to the paper's number, or for a ranking of methods under the
+        one closest to all four; None if no other reading was tried.
     """
 
     text: str
@@ -119,7 +119,7 @@ def _find(among: Sequence[Bar], name: str, kind: Kind) -> Bar | None:
 
 
 def _mean(among: Sequence[Bar], name: str, kind: Kind = "paper") -> float | None:
-    """Return the mean number of images, as the paper counts them: whatever is broken."""
+    """Return the mean number of images, counted as in the paper: regardless of violations."""
     bar = _find(among, name, kind)
     return bar.images if bar else None
 
@@ -152,7 +152,7 @@ def _order(text: str, values: dict[str, float | None]) -> Claim:
 def _with_readings(
     study: Study, done: Done, claim: Claim, names: tuple[str, ...], *, res: bool
 ) -> Claim:
-    """Add in how many readings an order of methods holds, and whether in the nearest one."""
+    """Add in how many readings a ranking of methods holds, and whether in the closest one."""
     ranked = rankings(study, done, names, res=res)
     near = joint(study, done)
     if near is None:
@@ -172,7 +172,7 @@ def _with_readings(
 
 
 def _level(study: Study, done: Done, *, is_mcts: bool, res: bool) -> Claim:
-    """Judge a number of Tables 6 and 7; among many readings one comes near by chance."""
+    """Judge a number of Tables 6 and 7; among many readings one comes close by chance."""
     near = nearest(study, done, is_mcts=is_mcts, res=res)
     name, table = ("MCTS", 7) if is_mcts else ("Forward search", 6)
     published = (best_mcts(res) if is_mcts else best_forward(res)).reward

@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from benchmarks.paper.settings import KINDS, Kind
 from benchmarks.paper.summary import Bar, Point
 
-# Told apart by those who see few colours, and in print (Okabe and Ito).
+# Distinguishable with colour vision deficiency and in print (Okabe and Ito).
 _COLOURS: Final[dict[Kind, str]] = {
     "paper": "#999999",
     "paper_hard": "#e69f00",
@@ -25,11 +25,11 @@ _COLOURS: Final[dict[Kind, str]] = {
 }
 _ACRONYMS: Final = ("milp", "mcts")
 _DPI: Final = 80
-_GROUP: Final = 0.84  # of the width for a method; the rest parts it from the next
+_GROUP: Final = 0.84  # share of the width for a method; the rest separates it from the next
 
 
 def figure_name(num_targets: int, *, res: bool) -> str:
-    """Return the name that a figure's files share.
+    """Return the common name of a figure's files.
 
     >>> figure_name(200, res=True)
     'with-resources-200'
@@ -38,7 +38,7 @@ def figure_name(num_targets: int, *, res: bool) -> str:
 
 
 def method_name(solver: str) -> str:
-    """Return what a method is called on the page.
+    """Return a method's name on the page.
 
     >>> method_name("forward_search"), method_name("milp")
     ('forward search', 'MILP')
@@ -47,7 +47,7 @@ def method_name(solver: str) -> str:
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a table, numbers with as many digits as anyone can use."""
+    """Write a table, numbers with as many digits as are useful."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
@@ -97,7 +97,7 @@ def draw_figure(path: Path, bars: Sequence[Bar], title: str) -> None:
 
 
 def _rewards(axes: Axes, bars: Sequence[Bar]) -> list[Artist]:
-    """Draw the first panel with the bound across it; return what the legend tells of it."""
+    """Draw the first panel with the bound across it; return the entries of its legend."""
     _panel(axes, bars, [bar.reward for bar in bars], "reward")
     whole = max(bars, key=lambda bar: bar.draws)
     axes.set_ylim(0.0, 1.06 * whole.bound)
@@ -121,7 +121,7 @@ def _rewards(axes: Axes, bars: Sequence[Bar]) -> list[Artist]:
 
 
 def _centres(bars: Sequence[Bar]) -> list[float]:
-    """Return where each bar stands: the methods at whole numbers, their settings about them."""
+    """Return the position of each bar: methods at whole numbers, their settings around them."""
     methods = list(dict.fromkeys(bar.solver for bar in bars))
     centres = []
     for bar in bars:

@@ -1,4 +1,4 @@
-"""What the study ran on, without a name or a path of it."""
+"""A description of the study's machine, without its name or paths."""
 
 from __future__ import annotations
 

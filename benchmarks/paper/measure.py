@@ -1,4 +1,4 @@
-"""One run of one solver on one problem: what the referee says, and how long it took."""
+"""One run of one solver on one problem: the referee's result, and the time it took."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _REPEAT_WITHIN_S = 0.1  # quicker runs are repeated, and the median time is kept
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What to run; equal tasks are run once.
+    """A run to make; equal tasks are run once.
 
     Attributes
     ----------
@@ -47,22 +47,22 @@ class Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What came of a task.
+    """The result of a task.
 
     Attributes
     ----------
     reward
         The referee's: an image by an action that breaks a rule earns nothing.
     images
-        Distinct targets imaged, whatever is broken: what the paper seems to count.
+        Distinct targets imaged, regardless of violations: what the paper seems to count.
     violations, repeats
-        Rules broken; images of targets that had one already.
+        Rules broken; images of targets that already had one.
     bound
-        The best bound proven on any plan of this problem: by this run or at once.
+        The best bound on any plan of this problem, proven by this run or by the quick bound.
     seconds
-        CPU time of the solving process in the solver alone: other load hardly counts.
+        CPU time of the solving process in the solver alone: other load hardly matters.
     cost_s
-        CPU time of the whole run: compilation, building the problem, repeats and judging too.
+        CPU time of the whole run, including compilation, building the problem, repeats and judging.
     """
 
     reward: float
@@ -76,7 +76,7 @@ class Outcome:
 
 
 def run_task(task: Task, deadline: float) -> Outcome | None:
-    """Return the outcome, or None where the study's time (``time.time``) ended first."""
+    """Return the outcome, or None if the study's time (``time.time``) ended first."""
     if time.time() >= deadline:
         return None
     began_s = time.process_time()

@@ -1,4 +1,4 @@
-"""Tasks over all cores, until they are done or the time is over."""
+"""Tasks over all cores, until they are done or the time is up."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Pool:
         self._executor.shutdown(wait=error is None, cancel_futures=True)
 
     def run(self, tasks: Sequence[Task]) -> Iterator[tuple[Task, Outcome]]:
-        """Yield each task with its outcome as it finishes; the deadline leaves the rest out."""
+        """Yield each task with its outcome as it finishes; skip the rest after the deadline."""
         waiting = iter(tasks)
         running: dict[Future[Outcome | None], Task] = {}
         while True:
-            # One more than there are workers, so that none waits for us.
+            # One more than there are workers, so that no worker waits for this process.
             while len(running) <= self._workers and time.time() < self._deadline:
                 task = next(waiting, None)
                 if task is None:
@@ -57,7 +57,7 @@ class Pool:
 
 
 def _end_with_parent() -> None:
-    """Let this process end when its parent does, even if that was killed."""
+    """Make this process end when its parent does, even if the parent is killed."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_outlive_nobody, args=(parent,), daemon=True).start()

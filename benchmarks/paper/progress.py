@@ -1,4 +1,4 @@
-"""A progress bar on one line; where nobody watches, a line every half minute."""
+"""A progress bar on one line; without a terminal, a line every half minute."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ProgressBar:
         self._shown = 0.0
 
     def show(self, done: int, phase: str, *, always: bool = False) -> None:
-        """Draw the bar, if it is time to."""
+        """Draw the bar if it is due."""
         now = time.time()
         if not always and now - self._shown < self._every_s:
             return
@@ -34,6 +34,6 @@ class ProgressBar:
         self._stream.flush()
 
     def close(self) -> None:
-        """Leave the line."""
+        """End the line."""
         if self._stream.isatty():
             self._stream.write("\n")

@@ -1,4 +1,4 @@
-"""What the paper itself reports: its grids (Tables 4, 5) and their outcomes (6, 7)."""
+"""The paper's published grids (Tables 4, 5) and their outcomes (6, 7)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ForwardRow:
 
     @property
     def tuned(self) -> Params:
-        """Return what the row names."""
+        """Return the parameters that the row gives."""
         return {"breadth": self.breadth, "gamma": self.gamma, "depth": self.depth}
 
 
@@ -43,7 +43,7 @@ class MctsRow:
 
     @property
     def tuned(self) -> Params:
-        """Return what the row names."""
+        """Return the parameters that the row gives."""
         return {
             "breadth": self.breadth,
             "gamma": self.gamma,

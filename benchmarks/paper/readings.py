@@ -1,4 +1,4 @@
-"""The ways to read what the paper leaves open, each a variant of its mission."""
+"""The possible readings of what the paper leaves open, each a variant of its mission."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from planner_core.domain import Dynamics, Scenario
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """How the mission is read.
+    """A reading of the mission.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Reading:
 
     @property
     def name(self) -> str:
-        """Return the reading in a few words, as it stands in the tables.
+        """Return the reading in a few words, as in the tables.
 
         >>> Reading().name
         'look 5-55, paper rates, paper dynamics'
@@ -41,11 +41,11 @@ class Reading:
         return f"look {low:g}-{high:g}, {rates} rates, {self.dynamics} dynamics"
 
     def covers(self, other: Reading, *, res: bool) -> bool:
-        """Return whether a family is the same under both: only angles matter without resources."""
+        """Return whether a family is the same in both: without resources only angles matter."""
         return self == other or (not res and self.look_deg == other.look_deg)
 
     def scenario(self, num_targets: int, draw: int, *, use_resources: bool) -> Scenario:
-        """Return one draw of the mission, read like this."""
+        """Return one draw of the mission under this reading."""
         scenario = paper_scenario(
             num_targets,
             draw,
@@ -67,7 +67,7 @@ _DYNAMICS: tuple[Dynamics, ...] = ("paper", "physical")
 
 
 def readings(*, use_resources: bool) -> tuple[Reading, ...]:
-    """Return the readings that differ in one family: only angles matter without resources."""
+    """Return the readings that differ in one family: without resources only angles matter."""
     if not use_resources:
         return tuple(Reading(look_deg=look) for look in _LOOKS)
     return tuple(

@@ -1,4 +1,4 @@
-"""The paper's best settings under every reading, and which comes nearest to its numbers."""
+"""The paper's best settings under every reading, and which is closest to its numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RULE = "rule"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadRow:
-    """One reading of the mission: what each method gets there, by name of the method."""
+    """One reading of the mission: each method's result, by name of the method."""
 
     reading: Reading
     outcomes: Mapping[str, Outcome]
@@ -38,25 +38,25 @@ class Joint:
 
     @property
     def told(self) -> str:
-        """Return ours for theirs, in words."""
+        """Return our numbers and theirs, in words."""
         pairs = zip(self.images, self.published, strict=True)
         return ", ".join(f"{images} for {published:.0f}" for images, published in pairs)
 
     @property
     def worst(self) -> float:
-        """Return the greatest error of the four, as a share of the paper's number."""
+        """Return the greatest error of the four, relative to the paper's number."""
         pairs = zip(self.images, self.published, strict=True)
         return max(abs(images / published - 1.0) for images, published in pairs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nearest:
-    """The reading that brings a method nearest to the paper, and how many images it takes.
+    """The reading in which a method is closest to the paper, and how many images it takes.
 
     Attributes
     ----------
     tried
-        Of how many readings; among many, one comes near by chance.
+        The number of readings tried; among many, one comes close by chance.
     own
         How many images it takes under the study's own reading, if that was run.
     """
@@ -70,12 +70,12 @@ class Nearest:
 
     @property
     def told(self) -> str:
-        """Return the reading in words, of the algorithm too where it has several."""
+        """Return the reading in words, including the algorithm's if it has several."""
         return self.reading.name + self.method.removeprefix("MCTS").removeprefix(FORWARD)
 
     @property
     def error(self) -> float:
-        """Return how far off it is, as a share of the paper's number."""
+        """Return the relative error to the paper's number."""
         return self.images / self.published - 1.0
 
 
@@ -85,7 +85,7 @@ def columns() -> list[str]:
 
 
 def read_rows(study: Study, done: Done, *, res: bool) -> list[ReadRow]:
-    """Return what was measured under each reading of one family."""
+    """Return the results under each reading of one family."""
     found = []
     for reading in study.of_family(res=res):
         tasks = {
@@ -101,7 +101,7 @@ def read_rows(study: Study, done: Done, *, res: bool) -> list[ReadRow]:
 
 
 def nearest(study: Study, done: Done, *, is_mcts: bool, res: bool) -> Nearest | None:
-    """Return the reading nearest to the paper's best row; the paper counts every image."""
+    """Return the reading closest to the paper's best row; the paper counts every image."""
     row = best_mcts(res) if is_mcts else best_forward(res)
     own = done.get(study.reading_task(row, BASE))
     measured = [
@@ -125,7 +125,7 @@ def nearest(study: Study, done: Done, *, is_mcts: bool, res: bool) -> Nearest | 
 
 
 def joint(study: Study, done: Done, among: Sequence[Reading] | None = None) -> Joint | None:
-    """Return the one reading under which the worst of the paper's four numbers is nearest."""
+    """Return the one reading that minimises the greatest error of the paper's four numbers."""
     among = study.readings_with if among is None else among
     without = {row.reading.look_deg: row.outcomes for row in read_rows(study, done, res=False)}
     published = tuple(
@@ -149,7 +149,7 @@ def joint(study: Study, done: Done, among: Sequence[Reading] | None = None) -> J
 def rankings(
     study: Study, done: Done, names: Sequence[str], *, res: bool
 ) -> dict[tuple[Reading, str], list[int]]:
-    """Return the images of these methods by reading of the mission and of MCTS, where all ran."""
+    """Return the images of these methods by reading of the mission and of MCTS, if all ran."""
     found = {}
     for row in read_rows(study, done, res=res):
         for variant in MCTS_VARIANTS:

@@ -1,4 +1,4 @@
-"""The named settings that the study compares: the paper's own, and what we ship."""
+"""The named settings that the study compares: the paper's, and our defaults."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PAPER_SEARCH: Final[Params] = {
     "feasibility": "penalty",
     "contact_above_fraction": 0.0,
 }
-"""What forward search and MCTS share in the paper (Table 2)."""
+"""Parameters that forward search and MCTS share in the paper (Table 2)."""
 
 PAPER_FORWARD: Final[Params] = {**PAPER_SEARCH, "gamma": 0.999, "depth": 3, "breadth": 3}
 
@@ -42,7 +42,7 @@ PAPER_MCTS: Final[Params] = {
     "rollout": "random",
     "keep_incumbent": False,
 }
-"""Without what Table 7 tunes."""
+"""Without those that Table 7 tunes."""
 
 MCTS_TUNED: Final[Mapping[bool, Params]] = {
     False: {"num_simulations": 500, "depth": 10, "gamma": 0.995},
@@ -53,7 +53,7 @@ MCTS_TUNED: Final[Mapping[bool, Params]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """A solver with parameters; those left out keep their defaults."""
+    """A solver with parameters; omitted ones keep their defaults."""
 
     kind: Kind
     solver: str
@@ -70,7 +70,7 @@ def make_solver(name: str, params: Params) -> Solver:
 
 
 def as_text(params: Params) -> str:
-    """Return parameters as one line that is equal for equal parameters.
+    """Return parameters as one line, equal for equal parameters.
 
     >>> as_text({"depth": 3, "breadth": 4})
     '{"breadth": 4, "depth": 3}'

@@ -1,4 +1,4 @@
-"""Finished runs in a CSV file that grows by one line each, so that nothing is done twice."""
+"""Finished runs in a CSV file that grows by one line each, so that no run is repeated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COLUMNS: Final = (*_READING, *_TASK, *_OUTCOME)
 
 
 def code_id() -> str:
-    """Return a short hash of the planning core: results of another core do not count."""
+    """Return a short hash of the planning core: results of a different core do not count."""
     digest = hashlib.sha256()
     root = Path(planner_core.__file__).parent
     for path in sorted(root.rglob("*.py")):
@@ -31,14 +31,14 @@ def code_id() -> str:
 
 
 class Store:
-    """What has been run, by task; ``add`` writes it to disk at once."""
+    """Finished runs, by task; ``add`` writes each to disk at once."""
 
     def __init__(self, path: Path):
         self._path = path
         self.done: dict[Task, Outcome] = {}
         path.parent.mkdir(parents=True, exist_ok=True)
         text = path.read_text(encoding="utf-8") if path.exists() else ""
-        # A run that was killed may have left half a line behind.
+        # A killed run may have left an incomplete line.
         whole = text[: text.rfind("\n") + 1]
         head = ",".join(COLUMNS) + "\n"
         if not whole.startswith(head):
@@ -58,7 +58,7 @@ class Store:
             file.write(line.getvalue())
 
     def minutes_in_all(self, took_min: float) -> float:
-        """Note the minutes of one more call and return those of all that filled this store."""
+        """Record the minutes of one more call and return those of all that filled this store."""
         path = self._path.with_suffix(".minutes")
         before = float(path.read_text(encoding="utf-8")) if path.exists() else 0.0
         path.write_text(f"{before + took_min:.3f}", encoding="utf-8")

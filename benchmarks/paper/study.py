@@ -1,4 +1,4 @@
-"""What is run, and in which order: what matters most first, in case the time ends."""
+"""What is run, and in which order: the most important first, in case time runs out."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ MCTS_VARIANTS: Final[Mapping[str, Params]] = {
     "hard limits": {"feasibility": "hard"},
     "r <= 0 becomes sun-pointing": {"worthless": "sunpoint"},
 }
-"""Readings of the algorithm, on top of those of the mission."""
+"""Readings of the algorithm, in addition to those of the mission."""
 
 _BEST_POINTS: Final = 5
-_SLOW_LEAVES: Final = 10_000  # of one decision; such searches take far longer than all others
+_SLOW_LEAVES: Final = 10_000  # per decision; such searches take far longer than all others
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +100,7 @@ class Study:
         )
 
     def forward(self, *, slow: bool) -> list[Task]:
-        """Return the runs of Table 4's grid in both families, the slow ones apart."""
+        """Return the slow or the other runs of Table 4's grid in both families."""
         return [
             self.grid_task("forward_search", point, res=res)
             for point, res in itertools.product(
@@ -112,8 +112,8 @@ class Study:
     def mcts(self, runs: range) -> list[Task]:
         """Return these runs of every point of Table 5's grid in both families.
 
-        The paper's rows come first, then all others mixed: where the time ends before the
-        grid does, what was measured is a fair sample of it.
+        The paper's rows come first, then all others shuffled: if time runs out before the grid
+        is done, the results are a fair sample of it.
         """
         rows = [row.tuned for row in TABLE_7]
         mixed = random.Random(0).sample(self.mcts_points, len(self.mcts_points))
@@ -128,7 +128,7 @@ class Study:
         return self.readings_with if res else self.readings_without
 
     def read(self, *, slow: bool) -> list[Task]:
-        """Return the paper's best rows under every reading, those that take a minute apart."""
+        """Return the paper's best rows under every reading: slow ones (a minute) or the rest."""
         tasks = []
         for res in (False, True):
             for reading in self.of_family(res=res):
@@ -154,7 +154,7 @@ class Study:
         return self.grid_task("mcts", params, res=row.use_resources, reading=reading)
 
     def best_so_far(self, done: Done) -> list[Task]:
-        """Return all runs of the MCTS points that lead for their breadth and family."""
+        """Return all runs of the MCTS points that are best for their breadth and family."""
         tasks = []
         for res, breadth in itertools.product((False, True), (3, 4, 5)):
             points = [p for p in self.mcts_points if p["breadth"] == breadth]
@@ -172,7 +172,7 @@ class Study:
         return statistics.fmean(rewards) if rewards else -1.0
 
     def phases(self) -> Iterator[tuple[str, Callable[[Done], Sequence[Task]]]]:
-        """Yield what to do in turn; a phase may depend on what came before."""
+        """Yield the phases in order; a phase may depend on earlier results."""
         yield "figures", lambda _: self.figures(exact=False)
         yield "forward search grid", lambda _: self.forward(slow=False)
         yield "figures, exact solvers", lambda _: self.figures(exact=True)
@@ -184,7 +184,7 @@ class Study:
         yield "MCTS grid, further runs", lambda _: self.mcts(range(1, self.mcts_runs))
 
     def all_tasks(self) -> list[Task]:
-        """Return everything once, as if time did not matter."""
+        """Return every task once, ignoring the time limit."""
         tasks = (task for _, choose in self.phases() for task in choose({}))
         return list(dict.fromkeys(tasks))
 
@@ -233,7 +233,7 @@ def _is_slow_point(point: Params, *, res: bool) -> bool:
 
 
 def _is_slow(task: Task) -> bool:
-    """Whether a reading takes a minute: a deep search, or MCTS that wanders."""
+    """Return whether a reading takes a minute: a deep search, or MCTS that wanders."""
     params = json.loads(task.params)
     if task.solver == "forward_search":
         return _is_slow_point(params, res=task.use_resources)

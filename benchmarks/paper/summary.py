@@ -16,7 +16,7 @@ from planner_core.solvers.registry import SOLVERS
 
 _PAPERS: Final = ("rule", "graph", "milp", "forward_search", "mcts")
 METHODS: Final = (*_PAPERS, *(name for name in SOLVERS if name not in _PAPERS))
-"""The order of all figures and tables: the paper's methods, then those it has not."""
+"""The order of all figures and tables: the paper's methods, then those it does not have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +26,7 @@ class Bar:
     Attributes
     ----------
     bound, proven
-        The best bound proven by any method; in how many draws some valid plan reaches it.
+        The best bound proven by any method; the number of draws in which a valid plan reaches it.
     """
 
     solver: str
@@ -83,7 +83,7 @@ def bars(study: Study, done: Done, num_targets: int, *, res: bool) -> list[Bar]:
 
 
 def _limits(study: Study, done: Done, num_targets: int, *, res: bool) -> dict[int, _Limit]:
-    """Return what all runs together have proven of each draw of a figure."""
+    """Return what all runs together have proven for each draw of a figure."""
     of_draw: dict[int, list[Outcome]] = {}
     for task, outcome in done.items():
         here = (task.reading, task.use_resources, task.num_targets)
@@ -101,7 +101,7 @@ class _Limit:
     def of(cls, outcomes: Sequence[Outcome]) -> _Limit:
         bound = min(o.bound for o in outcomes)
         best = max((o.reward for o in outcomes if not o.violations), default=0.0)
-        # Every reward is 1, so a bound below the next whole number is reached already.
+        # Every reward is 1, so a plan less than 1 below the bound has reached it.
         return cls(bound=bound, is_reached=best > bound - 1.0 + 1e-6)
 
 
@@ -144,7 +144,7 @@ def _point(params: Params, outcomes: Sequence[Outcome]) -> Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutcomeRow:
-    """A row of Table 6 or 7 beside ours: at the paper's point, and at our best one."""
+    """A row of Table 6 or 7 with ours: at the paper's point, and at our best one."""
 
     published: ForwardRow | MctsRow
     same: Point | None
@@ -152,7 +152,7 @@ class OutcomeRow:
 
 
 def outcome_rows(study: Study, done: Done, solver: str) -> list[OutcomeRow]:
-    """Return Table 6 (forward search) or 7 (MCTS) with what was measured."""
+    """Return Table 6 (forward search) or 7 (MCTS) with our measurements."""
     table: Sequence[ForwardRow | MctsRow] = TABLE_7 if solver == "mcts" else TABLE_6
     grid = study.mcts_points if solver == "mcts" else study.forward_points
     found = []
@@ -161,7 +161,7 @@ def outcome_rows(study: Study, done: Done, solver: str) -> list[OutcomeRow]:
         ours = [p for p in grid if p["breadth"] == row.breadth]
         same = points(study, done, solver, [row_params(row)], res=res)
         ranked = points(study, done, solver, ours, res=res)
-        # A single lucky run is no match for a mean over many.
+        # A single lucky run must not beat a mean over many.
         most_runs = max((point.runs for point in ranked), default=0)
         ranked = [point for point in ranked if point.runs == most_runs]
         found.append(
@@ -175,13 +175,13 @@ def outcome_rows(study: Study, done: Done, solver: str) -> list[OutcomeRow]:
 
 
 def row_params(row: ForwardRow | MctsRow) -> Params:
-    """Return a row's parameters with all that it leaves unsaid, as a grid point has them."""
+    """Return a row's parameters, with those it leaves out set as in the grid."""
     return {**(PAPER_MCTS if isinstance(row, MctsRow) else PAPER_SEARCH), **row.tuned}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """A part of the study: how many of its runs were made, and the CPU time they took."""
+    """A part of the study: how many of its runs are done, and the CPU time they took."""
 
     name: str
     runs: int
@@ -195,7 +195,7 @@ class Part:
 
 
 def parts(study: Study, done: Done) -> list[Part]:
-    """Return the parts of the study; a run that two of them share counts in the first."""
+    """Return the parts of the study; a run shared by two of them counts in the first."""
     named = {
         "figures, quick solvers": study.figures(exact=False),
         "figures, exact solvers": study.figures(exact=True),

@@ -1,1 +1,1 @@
-"""Seven days in closed loop: plans are made, flown by a world with luck of its own, and remade."""
+"""Seven days in closed loop: plans are made, flown in a world with random failures, and remade."""

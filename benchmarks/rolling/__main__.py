@@ -1,6 +1,6 @@
 """Fly seven days in closed loop (``python -m benchmarks.rolling CSV``).
 
-Writes a row for each policy and seed as soon as it is done; rows that are there are not run again.
+Writes a row for each policy and seed as soon as it is done; existing rows are not run again.
 Several processes may write the same file, each with its own policies or seeds.
 """
 
@@ -23,7 +23,7 @@ KEY = ("objective", "satellites", "days", "policy", "seed")
 
 
 def run(path: Path, objective: str, case: Case) -> None:
-    """Run a case and append its row, unless it is there."""
+    """Run a case and append its row, unless it exists."""
     key = (objective, case.num_satellites, case.days, case.policy, case.seed)
     named = {name: str(value) for name, value in zip(KEY, key, strict=True)}
     if path.exists() and any(named.items() <= row.items() for row in rows_of(path)):
@@ -49,7 +49,7 @@ def _short(value: float | str) -> float | str:
 
 
 def main() -> None:
-    """Run what is asked for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("table", type=Path)
     parser.add_argument("--policies", nargs="+", choices=POLICIES, default=list(POLICIES))

@@ -1,4 +1,4 @@
-"""One run of the closed loop: who is told what at which pass."""
+"""One run of the closed loop: which satellite receives which commands at which pass."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ from planner_core.solvers.registry import Certified
 
 PLANNED: Final = timedelta(hours=24)
 FREEZE: Final = timedelta(minutes=5)
-"""From the end of a pass: what begins sooner stays as it is."""
+"""From the end of a pass: actions that begin sooner stay as they are."""
 POLICIES: Final = {"1": 1, "2": 2, "4": 4, "pass": None}
 """Plans a day; None for one at every pass."""
 LIMITS_S: Final = (3.0, 0.6)
-"""CPU seconds for a plan that hardly has one before it, and for others.
+"""CPU seconds for a plan with hardly any predecessor, and for others.
 
-At 0.4 the proof could take what the moves needed: 277 where 317 could be had.
+At 0.4 the proof could use up the time of the moves: 277 where 317 was possible.
 """
 GAP: Final = 0.02
 STABILITY: Final = Stability(weight=0.5, contact_weight=0.5)
 """Half an image. At 0.2, with 1 CPU second, 3.4 % of the actions changed per replan of the first
-week, and no more came down: what is planned for tomorrow is planned again before it is flown.
+week, and no more was downlinked: what is planned for tomorrow is replanned before it is flown.
 """
 
 
@@ -74,7 +74,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a run came to; one row of the table."""
+    """The result of a run; one row of the table."""
 
     worth: float
     images: int
@@ -117,7 +117,7 @@ class Loop:
         self.worth_by_day: list[float] = []
 
     def run(self) -> Outcome:
-        """Fly the days and return what they came to."""
+        """Fly the days and return the result."""
         due = [START] * len(self.fleet)
         day = 1
         for at, number in self._commands():
@@ -206,7 +206,7 @@ class Loop:
         return lost / num_later
 
     def _scenario(self, number: int, now: datetime) -> Scenario:
-        """Return the question at a pass: what is known, and what the satellite has."""
+        """Return the scenario at a pass: what is known, and the satellite's state."""
         flown = self.fleet[number]
         self._told[number] = {r.target_id for r in flown.reports if r.outcome == "taken"}
         elsewhere = {
@@ -254,7 +254,7 @@ class Loop:
         )
 
     def _booked(self, number: int, now: datetime) -> tuple[BlockedInterval, ...]:
-        """Return when the only antennas are taken by other satellites: no contact then."""
+        """Return when other satellites occupy the only antennas: no contact is possible then."""
         return tuple(
             BlockedInterval(
                 satellite_id=self.satellites[number].id,
@@ -314,7 +314,7 @@ def _pinned(satellite_id: str, command: Command) -> PinnedAction:
 
 
 def commands_of(horizon: Horizon, problem: Problem, plan: Plan) -> tuple[Command, ...]:
-    """Return what a plan tells the only satellite of a problem."""
+    """Return the commands of a plan for the only satellite of a problem."""
     table = problem.opportunities
     found = []
     for action in plan.actions:

@@ -1,6 +1,6 @@
-"""Draw what policies delivered (``python -m benchmarks.rolling.plot CSV PNG``).
+"""Plot what policies delivered (``python -m benchmarks.rolling.plot CSV PNG``).
 
-A dot is a week with luck of its own, a bar the mean of them. Policies that have not flown every
+A dot is a week with its own random failures, a bar their mean. Policies that have not flown every
 week are left out.
 """
 
@@ -26,7 +26,7 @@ def compared(rows: list[dict[str, str]]) -> list[str]:
 
 def main(table: str, picture: str) -> None:
     """Draw the table into a picture."""
-    from matplotlib.figure import Figure  # which takes long, and is not wanted by ``compared``
+    from matplotlib.figure import Figure  # slow to import, and not needed by ``compared``
 
     rows = rows_of(Path(table))
     policies = compared(rows)

@@ -1,7 +1,7 @@
-"""The flown world: requests and luck that are the same for all policies, and satellites that fly.
+"""The flown world: requests and failures that are the same for all policies, and satellites.
 
-Batteries and recorders are integrated here and not by the referee, so that a fault of plans and of
-their replay alike would show: an image that finds no room is skipped on board, and counted.
+Batteries and recorders are integrated here and not by the referee, so that a fault common to plans
+and their replay would show: an image without room is skipped on board, and counted.
 """
 
 from __future__ import annotations
@@ -29,32 +29,32 @@ PASS_LOST: Final = 0.10
 SAFE_EVERY_DAYS: Final = 4.0
 SAFE: Final = timedelta(hours=6)
 
-_EDGE: Final = 1e-9  # of a battery or a recorder: what adding up may be off by
+_EDGE: Final = 1e-9  # of a battery or a recorder: tolerance for sums
 _IMAGE, _PASS, _SAFE, _REQUESTS = range(4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """A target that somebody asks for at an instant."""
+    """A target that somebody requests at an instant."""
 
     target: Target
     asked_at: datetime
 
     @property
     def is_urgent(self) -> bool:
-        """Whether it is worth more, and wanted soon."""
+        """Whether it is worth more, and due soon."""
         return self.target.reward > 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Luck:
-    """What fails, by seed: the same whatever is planned."""
+    """Failures, by seed: the same for every plan."""
 
     seed: int
     days: int
 
     def requests(self, num_first: int, num_a_day: int) -> tuple[Request, ...]:
-        """Return all requests in the order in which they come in."""
+        """Return all requests in the order in which they arrive."""
         scenes = load_wrs2_land()
         rng = np.random.default_rng([self.seed, _REQUESTS])
         number = num_first + num_a_day * self.days
@@ -78,7 +78,7 @@ class Luck:
         return tuple(found)
 
     def image_fails(self, satellite: int, target_id: str, start: datetime) -> bool:
-        """Return whether an image fails; those of one access share their luck."""
+        """Return whether an image fails; those of one access fail together."""
         orbit = int((start - START).total_seconds() // 2700)
         return self._draw(_IMAGE, satellite, int(target_id.encode().hex(), 16), orbit) < IMAGE_FAILS
 
@@ -106,7 +106,7 @@ class Luck:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """An action that a satellite is told to do."""
+    """An action that a satellite is commanded to do."""
 
     start: datetime
     end: datetime
@@ -116,7 +116,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """What came of an image: taken, failed, or skipped on board."""
+    """The outcome of an image: taken, failed, or skipped on board."""
 
     target_id: str
     at: datetime
@@ -125,14 +125,14 @@ class Report:
 
 @dataclass(kw_only=True)
 class Flown:
-    """A satellite in flight; what it has done so far.
+    """A satellite in flight and what it has done so far.
 
     Attributes
     ----------
     on_board
         What the recorder holds, first in, first out: target (None for telemetry), share of it.
     down
-        When each image was on the ground.
+        When each image was downlinked.
     """
 
     number: int
@@ -157,18 +157,18 @@ class Flown:
         return sum(share for _, share in self.on_board)
 
     def safe_until(self, at: datetime) -> datetime | None:
-        """Return when the safe mode ends in which it is at an instant; None for none."""
+        """Return when the safe mode at an instant ends; None if there is none."""
         return next((end for start, end in self._safe if start <= at < end), None)
 
     def free_from(self, at: datetime) -> datetime:
-        """Return the first instant from one on at which no command runs."""
+        """Return the first instant, from one on, at which no command runs."""
         for command in self.commands:
             if command.start < at < command.end:
                 at = command.end
         return at
 
     def fly(self, until: datetime) -> None:
-        """Go on as commanded, to an instant at which no command runs."""
+        """Continue as commanded, up to an instant at which no command runs."""
         left = []
         for command in self.commands:
             if command.end > until:
@@ -240,7 +240,7 @@ class Flown:
 
 
 def worth_down(requests: Iterable[Request], fleet: Iterable[Flown]) -> float:
-    """Return what is on the ground, each target once."""
+    """Return the worth of what is downlinked, each target once."""
     reward = {request.target.id: request.target.reward for request in requests}
     down = {target_id for flown in fleet for target_id in flown.down}
     return sum(reward[target_id] for target_id in down)

@@ -25,10 +25,10 @@ _ATTEMPTS: Final = 3  # of runs within which something was compiled
 
 
 def main() -> None:
-    """Do what the command line asks for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.suite", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one draw of each, smaller budgets")
-    parser.add_argument("--draws", type=int, metavar="N", help="so many of each family")
+    parser.add_argument("--draws", type=int, metavar="N", help="number of draws of each family")
     parser.add_argument("--into", type=Path, default=Path("build/suite.csv"), metavar="FILE")
     parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
     commands = parser.add_subparsers(dest="command")
@@ -54,7 +54,7 @@ def _read(path: Path) -> list[rows.Row]:
 
 
 def cases(families: list[str], num_draws: int | None = None, *, is_quick: bool) -> list[Case]:
-    """Return the cases of the full form, or of the quick one; with so many draws of each family."""
+    """Return the cases of the full or the quick form, with this number of draws of each family."""
     found = []
     for name in families:
         family = FAMILIES[name]
@@ -62,12 +62,12 @@ def cases(families: list[str], num_draws: int | None = None, *, is_quick: bool) 
         if budget_s is not None:
             for draw in range(num_draws or (1 if is_quick else family.num_draws)):
                 found.append(Case(family=name, draw=draw, seed=draw, budget_s=budget_s))
-    # The first draws of all come first: a file that was stopped early still has every family.
+    # The first draws of all come first: a file of a run stopped early still has every family.
     return sorted(found, key=lambda case: case.draw)
 
 
 def run(wanted: list[Case], path: Path) -> None:
-    """Run what is missing and write it down, row by row."""
+    """Run missing cases and write each row at once."""
     known = {row.case for row in rows.read(path, rows.Row)}
     for case in wanted:
         if case in known:
@@ -79,7 +79,7 @@ def run(wanted: list[Case], path: Path) -> None:
 
 
 def apart(case: Case) -> Result | str:
-    """Return the result of a case from a process of its own, or how that failed."""
+    """Return the result of a case from a process of its own, or how it failed."""
     command = [sys.executable, "-m", "benchmarks.suite", "one", json.dumps(asdict(case))]
     for _ in range(_ATTEMPTS):
         done = subprocess.run(command, capture_output=True, text=True, check=False)

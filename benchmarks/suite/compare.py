@@ -13,21 +13,21 @@ from benchmarks.suite.rows import Row
 WORSE_POINTS: Final = 0.1  # of gap
 WORSE_RATIO: Final = 1.1  # of time
 _SHIFT_S: Final = 0.1  # of the geometric means, so that hundredths of a second do not decide
-_SLACK: Final = 1e-9  # of what is just not worse
+_SLACK: Final = 1e-9  # tolerance for what is just not worse
 
 Pair = tuple[Row, Row]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One family: what was, what is, and what of it is worse.
+    """One family: its figures before and after, and which of them are worse.
 
     Attributes
     ----------
     ratios
-        Of CPU seconds to each gap of ``LEVELS``, after over before; None where neither came there.
+        CPU seconds to each gap of ``LEVELS``, after over before; None if neither reached it.
     failures
-        Cases that have an answer before and none after.
+        Cases with an answer before and none after.
     """
 
     family: str
@@ -47,7 +47,7 @@ class Line:
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """What is worse by more than the suite allows."""
+        """The figures that are worse by more than the suite allows."""
         found = ["gap"] if self.points > WORSE_POINTS + _SLACK else []
         for level, ratio in zip(LEVELS, self.ratios, strict=True):
             if ratio is not None and ratio > WORSE_RATIO + _SLACK:
@@ -58,7 +58,7 @@ class Line:
 
 
 def markdown(before: Sequence[Row], after: Sequence[Row]) -> str:
-    """Return the table, a line per family, and below it what only one of the files holds."""
+    """Return the table, a line per family, and below it the cases that only one file holds."""
     pairs, lonely = matched(before, after)
     levels = [f"time to {100.0 * level:g} %" for level in LEVELS]
     head = ["family", "cases", "gap % before", "after", "points", *levels, "memory", "worse"]
@@ -103,7 +103,7 @@ def line_of(pairs: Sequence[Pair]) -> Line:
 def _time_ratio(pairs: Sequence[Pair], level: int) -> float | None:
     """Return the ratio of shifted geometric means of the seconds to a gap.
 
-    A run that did not come there counts with all it used, which is less than it would need.
+    A run that did not reach it counts with all the time it used, less than it would need.
     """
     logs = []
     for a, b in pairs:

@@ -1,7 +1,7 @@
-"""One case of the suite in this process: all that the suite takes of the planner.
+"""One case of the suite in this process: all that the suite uses of the planner.
 
-Only the public road from a scenario to a judged plan is used, so the package can be copied into
-the checkout of another release and run there; where modules have other names, this file tells.
+Only the public path from a scenario to a judged plan is used, so the package can be copied into
+the checkout of another release and run there; if modules have other names, only this file changes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from planner_core.referee.replay import replay
 from planner_core.solvers.registry import Certified
 
 LEVELS: Final = (0.02, 0.01, 0.005, 0.0)
-"""Gaps of which the suite notes when they were first reached."""
+"""Gaps for which the suite records when they were first reached."""
 
 _ROUNDING: Final = 1e-6  # relative; rewards to which bounds are stated
 _WARM_UP_S: Final = 20.0
@@ -42,14 +42,14 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What a case came to.
+    """The result of a case.
 
     Attributes
     ----------
     bound
-        Infinite where nothing was proven.
+        Infinite if nothing was proven.
     to_level_s
-        CPU seconds until the gap was first within each of ``LEVELS``, None where it never was.
+        CPU seconds until the gap was first within each of ``LEVELS``, None if it never was.
     compiled_s
         Seconds of compilation within the clock: such a run says nothing about speed.
     """
@@ -63,7 +63,7 @@ class Result:
 
 
 class Curve:
-    """Listens to progress and notes when each gap was first reached."""
+    """A listener to progress that records when each gap was first reached."""
 
     def __init__(self) -> None:
         self._began_s = time.process_time()
@@ -75,7 +75,7 @@ class Curve:
         self.note(progress.reward, progress.bound, time.process_time() - self._began_s)
 
     def note(self, reward: float | None, bound: float | None, used_s: float) -> None:
-        """Take a reward and a bound; None for what is not known."""
+        """Take a reward and a bound; None for an unknown one."""
         self._reward = max(self._reward, 0.0 if reward is None else reward)
         self._bound = min(self._bound, math.inf if bound is None else bound)
         for i, level in enumerate(LEVELS):
@@ -90,7 +90,7 @@ def run_case(case: Case) -> Result:
     Raises
     ------
     AssertionError
-        Where the referee finds a violation.
+        If the referee finds a violation.
     """
     warm_up(case.family)
     problem = problem_of(scenario_of(FAMILIES[case.family], case.draw))
@@ -98,17 +98,17 @@ def run_case(case: Case) -> Result:
 
 
 def warm_up(family: str) -> None:
-    """Load what a family needs of kernels."""
+    """Load the kernels that a family needs."""
     solve(problem_of(warm_up_of(FAMILIES[family])), 0, _WARM_UP_S)
 
 
 def solve(problem: Problem, seed: int, budget_s: float) -> Result:
-    """Plan a problem that is built, in so many CPU seconds of this process.
+    """Plan a built problem in the given CPU seconds of this process.
 
     Raises
     ------
     AssertionError
-        Where the referee finds a violation.
+        If the referee finds a violation.
     """
     compiled_s: list[float] = []
     with event.install_timer("numba:compile", compiled_s.append):

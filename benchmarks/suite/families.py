@@ -1,4 +1,4 @@
-"""What the suite plans: families of missions, each with its sizes, budgets and draws."""
+"""The suite's missions: families, each with its sizes, budgets and draws."""
 
 from __future__ import annotations
 
@@ -52,26 +52,26 @@ class Family:
     Attributes
     ----------
     budget_s, quick_budget_s
-        CPU seconds for a case in the full form and in the quick one; the latter None where the
-        family is left out there.
+        CPU seconds for a case in the full form and in the quick one; None in the latter if the
+        quick form leaves the family out.
     num_draws
         How many missions the full form draws; the quick one takes the first of them.
     dynamics
         None without resources.
     has_random_rewards
-        Whether rewards are drawn from 1 to 10, and not all 1.
+        Whether rewards are drawn from 1 to 10 instead of all being 1.
     has_tight_battery
-        Whether images cost twice and sunlight gives half of what the paper's spacecraft has.
+        Whether images use twice, and sunlight gives half, of the paper's spacecraft's energy.
     objective
-        What an image is worth; all worth what they are when they are taken where it says nothing.
+        What an image earns; by default all its worth when it is taken.
     has_forecast
-        Whether it is worth that by the chance of a clear sky (``benchmarks.clouds``).
+        Whether that is multiplied by the probability of a clear sky (``benchmarks.clouds``).
     has_quality
         Whether images off nadir are worth less.
     turns_to_sun
-        Whether satellites charge between turns to the sun alone.
+        Whether satellites charge only between turns to the sun and back.
     num_stations
-        How many stations are drawn over the land; the paper's two where it says nothing.
+        How many stations are drawn over the land; by default the paper's two.
     """
 
     num_targets: int
@@ -304,7 +304,7 @@ def warm_up_of(family: Family) -> Scenario:
 
 
 def fleet(number: int) -> tuple[Satellite, ...]:
-    """Return satellites in planes spread evenly, each 1 deg/s and 15 s to settle."""
+    """Return satellites in evenly spread planes, each with 1 deg/s and 15 s to settle."""
     return tuple(_fleet_satellite(i, 360.0 * i / number) for i in range(number))
 
 
@@ -331,7 +331,7 @@ def _fleet_satellite(index: int, raan_deg: float) -> Satellite:
 
 
 def towns(number: int, draw: int) -> tuple[Target, ...]:
-    """Return targets in clusters, as cities lie, around land scenes drawn at random."""
+    """Return targets in clusters, like cities, around land scenes drawn at random."""
     scenes = paper_scenario(number, draw, use_resources=False).targets
     inhabited = [scene for scene in scenes if abs(scene.lat_deg) <= _HIGHEST_TOWN_LAT_DEG]
     centres = inhabited[: -(-number // _TARGETS_PER_TOWN)]

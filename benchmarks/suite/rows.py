@@ -15,17 +15,17 @@ from benchmarks.suite.engine import Case, Result
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line: the case, what it came to, and of which revision.
+    """One line: the case, its result, and the revision.
 
     Attributes
     ----------
     gap_percent, to_2_s, to_1_s, to_half_s, to_0_s
-        Of the bound at the end; CPU seconds until it was first within 2, 1, 0.5 and 0 %. None
-        where it never was.
+        Gap at the end; CPU seconds until it was first within 2, 1, 0.5 and 0 %, None if it never
+        was.
     revision, date
-        What ``git describe`` says, and the day, UTC.
+        The output of ``git describe``, and the day, UTC.
     failure
-        How a run without an answer ended; empty for one with an answer.
+        How a run without an answer ended; empty if there is one.
     """
 
     family: str
@@ -47,7 +47,7 @@ class Row:
 
     @property
     def case(self) -> Case:
-        """The case, by which rows of two files are the same."""
+        """The case, by which rows of two files are matched."""
         return Case(family=self.family, draw=self.draw, seed=self.seed, budget_s=self.budget_s)
 
     @property
@@ -60,7 +60,7 @@ R = TypeVar("R", bound=Row)
 
 
 def row_of(case: Case, result: Result | str, kind: type[R], **more: str) -> R:
-    """Return the line of a case: its result, or how it failed, and what else its kind tells."""
+    """Return the line of a case: its result or failure, and further fields of its kind."""
     told: dict[str, Any] = {**more, "revision": revision(), "date": f"{datetime.now(UTC):%Y-%m-%d}"}
     if isinstance(result, str):
         return kind(**asdict(case), **told, failure=result)
@@ -87,14 +87,14 @@ def _rounded(value: float | None, digits: int) -> float | None:
 
 
 def revision() -> str:
-    """Return what git calls the sources, or nothing outside a repository."""
+    """Return git's description of the sources, or nothing outside a repository."""
     command = ["git", "describe", "--always", "--tags", "--dirty"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.stdout.strip()
 
 
 def read(path: Path, kind: type[R]) -> list[R]:
-    """Return the rows of a file; none where there is no file."""
+    """Return the rows of a file; none if it does not exist."""
     if not path.exists():
         return []
     with path.open(encoding="utf-8", newline="") as lines:
@@ -115,7 +115,7 @@ def _parsed(record: dict[str, str], kind: type[R]) -> R:
 
 
 def append(path: Path, row: Row) -> None:
-    """Write one more row, below the head if it is the first."""
+    """Append one row, below the header if it is the first."""
     path.parent.mkdir(parents=True, exist_ok=True)
     is_new = not path.exists()
     with path.open("a", encoding="utf-8", newline="") as lines:

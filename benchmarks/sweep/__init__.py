@@ -1,1 +1,1 @@
-"""Missions drawn at random over all options, planned in every way that there is."""
+"""Missions drawn at random over all options, planned in every available way."""

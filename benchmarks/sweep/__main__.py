@@ -1,9 +1,9 @@
-"""Plan missions drawn at random, and name what is wrong with the answers.
+"""Plan missions drawn at random, and report faults of the answers.
 
 Every solver plans each mission, and ``certified`` under other objectives too; all plans are judged
 under the mission's own. A fault is a plan that the referee refuses, a bound below a plan, a plan
-that is better than that of ``certified`` by more than half a percent, or an answer of ``certified``
-that took half as long again as it was given.
+better than that of ``certified`` by more than half a percent, or an answer of ``certified`` that
+took 1.5 times the time it was given.
 
     python -m benchmarks.sweep --first 1 --last 40 --cpu-s 10 build/sweep.csv
 """
@@ -40,12 +40,12 @@ _NEIGHBOURS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """What one way of planning a mission came to.
+    """The result of one way of planning a mission.
 
     Attributes
     ----------
     bound
-        None where nothing is proven, or of another objective.
+        None if nothing is proven, or only for another objective.
     """
 
     way: str
@@ -115,7 +115,7 @@ def _answer(way: str, solver: Solver, asked: Problem, problem: Problem, cpu_s: f
 
 
 def fault_of(answer: Answer, answers: list[Answer], cpu_s: float) -> str:
-    """Return what is wrong with an answer beside the others, or nothing."""
+    """Return what is wrong with an answer compared with the others, or nothing."""
     valid = [other.reward for other in answers if other.is_valid]
     best = max(valid, default=0.0)
     if not answer.is_valid:
@@ -130,7 +130,7 @@ def fault_of(answer: Answer, answers: list[Answer], cpu_s: float) -> str:
 
 
 def _told(scenario: Scenario) -> str:
-    """Return a mission in a few words."""
+    """Return a short description of a mission."""
     hours = (scenario.horizon.end - scenario.horizon.start).total_seconds() / 3600.0
     objective = scenario.objective
     words = [

@@ -1,4 +1,4 @@
-"""A mission by its number: every option of a scenario has its chance."""
+"""Missions by number: every option of a scenario occurs in some of them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _STATIONS: Final = (
 
 
 def random_mission(number: int) -> Scenario:
-    """Return the mission of that number; the same each time."""
+    """Return the mission of that number; always the same one."""
     rng = np.random.default_rng(number)
     num_satellites = int(rng.choice(_SATELLITES))
     hours, num_targets = float(rng.choice(_HOURS)), int(rng.choice(_TARGETS))

@@ -35,7 +35,7 @@ def encloses(problem: Problem, best: float, draw: int = 0) -> bool:
     Parameters
     ----------
     draw
-    The number of the problem, which selects the constants of the search.
+        The number of the problem, which selects the constants of the search.
     """
     solution = certified(problem, draw)
     timeline = replay(problem, solution.plan, in_detail=False)
