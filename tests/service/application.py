@@ -1,4 +1,4 @@
-"""The application, on routes and with an OpenAPI document that are prepared once for all."""
+"""The application with routes and an OpenAPI document that are prepared once for all tests."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from service.settings import Settings
 
 @functools.cache
 def first_app() -> FastAPI:
-    """Return the one whose routes all others have."""
+    """Return the application whose routes all others share."""
     return create_app(Settings(database_url="sqlite:///unused.db"))
 
 
 def new_app(settings: Settings, queue: JobQueue | None = None, **options: Any) -> FastAPI:
-    """Return the application with settings of its own, on routes that another one has prepared.
+    """Return an application with its own settings, on routes that the first one has prepared.
 
-    FastAPI prepares the routes of each application at its first call, for 0.1 s, and its OpenAPI
-    document for 0.6. They know nothing of settings.
+    FastAPI prepares the routes of each application at its first call, in 0.1 s, and its OpenAPI
+    document in 0.6 s. Neither depends on settings.
     """
     app = create_app(settings, queue, **options)
     app.router.routes[:] = first_app().router.routes
@@ -33,7 +33,7 @@ def new_app(settings: Settings, queue: JobQueue | None = None, **options: Any) -
 
 
 def prepare_routes() -> None:
-    """Prepare them now, by a call of none of them: no thread begins, no database is opened."""
+    """Prepare the routes by a call that matches none: starts no thread and opens no database."""
     statuses: list[int] = []
 
     async def receive() -> dict[str, Any]:

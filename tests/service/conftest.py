@@ -40,9 +40,9 @@ class Service:
 
 
 class _PromptServer(uvicorn.Server):
-    """Ends as soon as it is told to; others look every tenth of a second.
+    """A server that ends as soon as it is told to; others look every tenth of a second.
 
-    To look a hundred times a second takes 2.8 % of a core from the tests, and this 0.4.
+    Looking a hundred times a second takes 2.8 % of a core from the tests; this takes 0.4 %.
     """
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -55,7 +55,7 @@ class _PromptServer(uvicorn.Server):
                 await asyncio.wait_for(self._told.wait(), 0.1)
 
     def end(self) -> None:
-        """Tell it to, from another thread."""
+        """Tell the server to end, from another thread."""
         self._loop.call_soon_threadsafe(self._end)
 
     def _end(self) -> None:
@@ -82,19 +82,19 @@ def serve(app: FastAPI) -> Iterator[str]:
 
 @functools.cache
 def contract() -> Contract:
-    """Return what the OpenAPI document promises; it is the same whatever the settings."""
+    """Return the contract of the OpenAPI document, which does not depend on settings."""
     return Contract(first_app().openapi())
 
 
 def checked_client(address: str) -> httpx.Client:
-    """Return a client that holds every answer against the OpenAPI document."""
+    """Return a client that checks every answer against the OpenAPI document."""
     hooks = {"response": [contract().check]}
     return httpx.Client(base_url=address, timeout=60, verify=NO_TLS, event_hooks=hooks)
 
 
 @pytest.fixture(scope="session")
 def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with the schema and nothing else, to be copied."""
+    """A database with only the schema, to be copied."""
     path = tmp_path_factory.mktemp("database") / "empty.db"
     upgrade(f"sqlite:///{path}")
     return path
@@ -109,7 +109,7 @@ def settings(tmp_path: Path, empty_database: Path) -> Settings:
 
 @pytest.fixture(scope="session")
 def running_app(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[FastAPI, str]]:
-    """The application on a port of its own, for all tests; each gives it its own database."""
+    """The application on one port for all tests; each test gives it its own database."""
     unused = f"sqlite:///{tmp_path_factory.mktemp('unused') / 'unused.db'}"
     app = new_app(Settings(database_url=unused, max_body_mb=4.0))
     with serve(app) as address:

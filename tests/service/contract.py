@@ -1,4 +1,4 @@
-"""The OpenAPI document held against what the service answers."""
+"""The service's answers, checked against the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Document = dict[str, Any]
 class Contract:
     """Checks answers against the document: status, media type, and the schema of JSON bodies.
 
-    Give ``check`` to a client as an event hook, and every answer that a test sees is checked.
+    Pass ``check`` to a client as an event hook to check every answer of a test.
     """
 
     def __init__(self, document: Document):
@@ -27,7 +27,7 @@ class Contract:
         ]
 
     def operation(self, method: str, path: str) -> tuple[str, Document] | None:
-        """Return the template and the operation of a call; None where there is none."""
+        """Return the template and the operation of a call; None if there is none."""
         for pattern, template in self._patterns:
             operation = self.document["paths"][template].get(method.lower())
             if pattern.fullmatch(path) and operation is not None:
@@ -35,9 +35,9 @@ class Contract:
         return None
 
     def check(self, response: httpx.Response) -> None:
-        """Raise where an answer is not declared."""
+        """Raise an error if an answer is not declared."""
         request = response.request
-        # As it was sent: an id may hold a slash.
+        # The path as sent: an id may contain a slash.
         path = request.url.raw_path.decode().partition("?")[0]
         found = self.operation(request.method, path)
         told = f"{request.method} {request.url.path}: {response.status_code}"

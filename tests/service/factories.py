@@ -12,7 +12,7 @@ from planner_core.domain import OrbitElements
 from planner_core.orbits.tle import format_tle
 
 EPOCH = datetime(2026, 3, 1, tzinfo=UTC)
-# There is one satellite of a catalogue number.
+# Only one satellite may have a catalogue number.
 _NUMBERS = itertools.count(91_001)
 
 
@@ -49,7 +49,7 @@ def ground_station(**fields: Any) -> dict[str, Any]:
 
 
 def post(client: httpx.Client, path: str, body: object) -> dict[str, Any]:
-    """Post what must be accepted; return the answer."""
+    """Post a body that must be accepted; return the answer."""
     response = client.post(path, json=body)
     assert response.is_success, response.text
     answer: dict[str, Any] = response.json()

@@ -2,9 +2,9 @@
 
 Such a program is a process of its own that runs what ``python -m`` would run, with its own
 arguments, environment and streams; it can be signalled, killed and waited for. Only imports are
-shared, and done before any thread begins. Workers that it starts, and what these fork their jobs
-from, are forks too (``spare``). What is started with other settings than those of
-Slewline is started as a user would, since libraries may read theirs while they are imported.
+shared, and done before any thread begins. The workers that it starts, and the processes from which
+these fork their jobs, are forks too (``spare``). A program started with settings other than
+Slewline's is started as a user would, since libraries may read theirs on import.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ _NAME: Final = "SLEWLINE_TEST_PREPARED"
 
 
 class Prepared:
-    """A program that runs: of ``subprocess.Popen`` what tests need."""
+    """A running program, with the parts of ``subprocess.Popen`` that tests need."""
 
     def __init__(self, pid: int, told: socket.socket, stdout: IO[str] | None) -> None:
         self.pid = pid
         self.stdout = stdout
         self.returncode: int | None = None
         self._told = told
-        # How it ended is told once, whoever waits for it: chaos waits in two threads.
+        # The exit status is sent once, whoever waits for it: chaos waits in two threads.
         self._waiting = threading.Lock()
 
     def poll(self) -> int | None:
-        """Return how it ended, or None while it runs."""
+        """Return the exit status, or None while the program runs."""
         return self._status(0.0)
 
     def wait(self, timeout: float | None = None) -> int:
-        """Return how it ended, as soon as it has."""
+        """Return the exit status once the program has ended."""
         status = self._status(timeout)
         if status is None:
             raise subprocess.TimeoutExpired("a prepared program", timeout or 0.0)
         return status
 
     def send_signal(self, number: int) -> None:
-        """Send a signal, unless it has ended."""
+        """Send a signal, unless the program has ended."""
         if self.poll() is None:
             with suppress(ProcessLookupError):
                 os.kill(self.pid, number)
@@ -146,13 +146,13 @@ def _differs_in_own_settings_alone(env: Mapping[str, str]) -> bool:
 
 
 def share() -> None:
-    """Start the process that programs are forked from, for this one and all that it starts."""
+    """Start the process from which programs are forked, for this process and all its children."""
     os.environ[_NAME] = _begin()
 
 
 @cache
 def _server() -> tuple[socket.socket, dict[str, str]]:
-    """Return a way to the process that programs are forked from, and its environment."""
+    """Return a connection to the process from which programs are forked, and its environment."""
     environment = dict(os.environ)
     server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     server.connect("\0" + (environment.get(_NAME) or _begin()))
@@ -161,7 +161,7 @@ def _server() -> tuple[socket.socket, dict[str, str]]:
 
 
 def _begin() -> str:
-    """Start the process that programs are forked from; return the name at which it listens.
+    """Start the process from which programs are forked; return the name at which it listens.
 
     It ends with this process.
     """
@@ -169,7 +169,7 @@ def _begin() -> str:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.bind("\0" + name)
         listener.listen()
-        # A test may have gone to another folder before it asks for the first program.
+        # A test may have changed the folder before it starts its first program.
         process = subprocess.Popen(
             [sys.executable, "-m", __name__, str(listener.fileno())],
             stdin=subprocess.PIPE,
@@ -185,13 +185,13 @@ def _begin() -> str:
     return name
 
 
-# In the process that programs are forked from -------------------------------------------------
+# In the process from which programs are forked ------------------------------------------------
 
 
 def main() -> None:
-    """Import the service, and start what is asked for, until the end of the standard input.
+    """Import the service, and start requested programs until the end of the standard input.
 
-    That ends with who began this process, be it by SIGKILL.
+    That ends with the process that began this one, even if by SIGKILL.
     """
     with importing():
         import service.commands.cli
@@ -202,10 +202,10 @@ def main() -> None:
         from tests.service import application
 
         application.prepare_routes()
-    # Each would prepare its routes once more, and its process for heavy work too.
+    # Otherwise each program would prepare its routes again, and its process for heavy work too.
     for module in (service.server, service.heavy):
         setattr(module, "create_app", application.new_app)  # noqa: B010 - no module declares it
-    # Who minds a program is collected by nobody; Ctrl-C is for the programs.
+    # Nobody waits for the processes that mind programs; Ctrl-C is for the programs.
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     listener = socket.socket(fileno=int(sys.argv[1]))
@@ -214,9 +214,9 @@ def main() -> None:
 
 
 class _Forks:
-    """Starts what is asked for in this process, until the end of the first of some files.
+    """Starts requested programs in this process, until the end of the first of some files.
 
-    The others are a listener, or one who asks.
+    The others are a listener, or a requesting process.
     """
 
     def __init__(self, end: Any, *others: socket.socket) -> None:
@@ -241,7 +241,7 @@ class _Forks:
                     file.close()
 
     def _start(self, client: socket.socket) -> bool:
-        """Start what a process asks for; return whether it still was there to ask."""
+        """Start a requested program; return whether the requesting process still existed."""
         data, descriptors, _, _ = socket.recv_fds(client, spare.MOST_BYTES, 3)
         if not data:
             return False
@@ -256,9 +256,9 @@ class _Forks:
         return True
 
     def _with_kernels(self, not_for_it: Sequence[int]) -> socket.socket:
-        """Return a way to a fork that has all kernels too, for those whose workers load them.
+        """Return a connection to a fork that has all kernels too, for programs that plan with them.
 
-        Each would take half a second. Other programs shall not hold what they never need.
+        Loading takes each of them half a second. Other programs must not hold unneeded kernels.
         """
         if self._twin is None:
             self._twin, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -274,7 +274,7 @@ class _Forks:
         return self._twin
 
     def _close(self) -> None:
-        """Close in a fork all that only this process needs."""
+        """Close in a fork everything that only this process needs."""
         for key in self._selector.get_map().values():
             os.close(key.fd)
         self._selector.close()
@@ -283,10 +283,10 @@ class _Forks:
 
 
 def _mind(asked: dict[str, Any], told: int, stdout: int, stderr: int) -> NoReturn:
-    """Start a program, tell its process id, and how it ended.
+    """Start a program, send its process id, and later its exit status.
 
-    Where the process that asked for it ends first, so does this one. A worker is told that this
-    one has started it, so it ends as well.
+    If the requesting process ends first, so does this one. A worker is told that this one is
+    its supervisor, so it ends as well.
     """
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     words: list[str] = asked["words"]

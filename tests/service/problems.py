@@ -1,4 +1,4 @@
-"""What every problem document holds."""
+"""The content of every problem document."""
 
 from __future__ import annotations
 

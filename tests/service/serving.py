@@ -19,7 +19,7 @@ def serving(
 ) -> Iterator[tuple[Program, str]]:
     """Run the program on the folder's database; yield the process and its first line.
 
-    Its log stands in the folder too, under the command's name. ``settings`` go into its
+    Its log is in the folder too, under the command's name. ``settings`` go into its
     environment.
     """
     words = _words(tmp_path, command, options)
@@ -34,7 +34,7 @@ def serving(
 def serving_as_installed(
     tmp_path: Path, command: str, *options: str
 ) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Do the same as ``serving``, by a start as a user's: for tests of just that."""
+    """Do the same as ``serving``, but start the program as a user does: for tests of the start."""
     words = [sys.executable, "-m", *_words(tmp_path, command, options)]
     with (tmp_path / f"{command}.log").open("wb") as log:
         process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log, text=True)
@@ -49,7 +49,7 @@ def _words(folder: Path, command: str, options: tuple[str, ...]) -> list[str]:
 
 @contextmanager
 def _first_line(process: Program) -> Iterator[str]:
-    """Yield what a process says first, and end it."""
+    """Yield a process's first line of output, and end the process."""
     assert process.stdout is not None
     try:
         yield process.stdout.readline()

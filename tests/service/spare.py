@@ -1,12 +1,12 @@
-"""Runs programs in a fork of what has imported the service; what these start are forks as well.
+"""Runs programs in a fork of a process that has imported the service; their children are forks too.
 
-A worker, and the fork server of its jobs, are programs of their own that import nearly all that
-was there already where they were started. So a program that will start them first forks, while it
-has one thread and no open file, a spare process for each. That one waits for its words, its
-environment and its descriptors, and becomes what was to be started: a child of the program, with
-the same descriptors at the same numbers and no others. It has the command line of the process it is
-a fork of. A spare that nobody asks for ends with the program. Where all are used up the next
-process is started as ever.
+A worker, and the fork server of its jobs, are separate programs that import nearly everything that
+their parent has already imported. So a program that will start them first forks a spare process for
+each, while it has one thread and no open file. The spare waits for its words, its environment and
+its descriptors, and becomes the program to start: a child of the parent, with the same descriptors
+at the same numbers and no others. Its command line is that of the process it was forked from. An
+unused spare ends with the parent. When all spares are used up, the next process is started the
+ordinary way.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def run(words: Sequence[str], env: Mapping[str, str], folder: str) -> NoReturn:
     Parameters
     ----------
     words
-        What follows ``-m``; or ``-c`` and the code.
+        The words after ``-m``; or ``-c`` and the code.
     env
         The whole environment.
     """
@@ -59,20 +59,20 @@ def run(words: Sequence[str], env: Mapping[str, str], folder: str) -> NoReturn:
 
 def has_plans(words: Sequence[str]) -> bool:
     """Return whether a program, or one that it starts, loads all kernels to plan with them."""
-    # Whoever only asks for programs, as each process of tests does, need not import this.
+    # A process that only requests programs, like each test process, need not import this.
     from service.jobs.runner import Work
 
     return Work().preload in words or _num_workers(words) > 0
 
 
 def _num_workers(words: Sequence[str]) -> int:
-    """Return how many workers a program is told to start beside it; nothing of a fault."""
+    """Return how many workers a program is told to start; zero if that is no number."""
     text = dict(pairwise(words)).get("--workers", "0")
     return min(int(text), _MOST_SPARES) if text.isdecimal() else 0
 
 
 def _keep(number: int) -> None:
-    """Fork so many spares, and have them become what this process starts."""
+    """Fork this number of spares, and use them for the processes that this one starts."""
     spares: list[tuple[int, socket.socket]] = []
     for _ in range(number):
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -96,13 +96,13 @@ def _keep(number: int) -> None:
                 return pid
         return exactly(*arguments)
 
-    # ``subprocess`` has a name of its own for what ``multiprocessing`` looks up.
+    # ``subprocess`` keeps its own reference; ``multiprocessing`` looks the function up.
     for module, name in ((_posixsubprocess, "fork_exec"), (subprocess, "_fork_exec")):
         setattr(module, name, fork_exec)
 
 
 def _words(command: Sequence[str]) -> list[str]:
-    """Return what a spare runs of a command; nothing where it is no worker or fork server."""
+    """Return the words of a command that a spare can run; none unless worker or fork server."""
     if "-m" in command:
         words = list(command[command.index("-m") + 1 :])
         return words if words[0] == "service.jobs" else []
@@ -111,9 +111,9 @@ def _words(command: Sequence[str]) -> list[str]:
 
 
 def _wake(spare: socket.socket, words: list[str], *options: Any) -> None:
-    """Have a spare become a program, with these of the options of ``fork_exec``.
+    """Make a spare become a program, with these of the options of ``fork_exec``.
 
-    They stand in the order of CPython 3.11 and later.
+    They are in the order of CPython 3.11 and later.
     """
     kept, folder, env, stdin, _, _, stdout, _, stderr, _, untold, _, has_session = options
     ends = zip(range(3), (stdin, stdout, stderr), strict=True)
@@ -131,7 +131,7 @@ def _wake(spare: socket.socket, words: list[str], *options: Any) -> None:
 
 
 def _wait(program: socket.socket) -> NoReturn:
-    """Hold nothing of the program, and become what it asks for, or end when it ends."""
+    """Hold nothing of the program, and become what it requests, or end when it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     nothing = os.open(os.devnull, os.O_RDWR)
     for number in range(3):
@@ -142,7 +142,7 @@ def _wait(program: socket.socket) -> NoReturn:
         os._exit(0)
     program.close()
     asked = json.loads(data)
-    # No copy stands where another one belongs.
+    # Place copies above all wanted numbers, so that none is overwritten.
     above = max(asked["numbers"]) + 1
     copies = [fcntl.fcntl(each, fcntl.F_DUPFD, above) for each in descriptors]
     for each in descriptors:

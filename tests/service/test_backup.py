@@ -20,7 +20,7 @@ def back_up(settings: Settings, file: Path) -> int:
 
 
 def test_a_backup_is_one_file_of_what_was_committed(settings: Settings, tmp_path: Path) -> None:
-    """A writer is in the middle of a transaction, and goes on afterwards."""
+    """A writer is in the middle of a transaction, and continues afterwards."""
     file = tmp_path / "backup.db"
     database = Database(settings.database_url)
     insert = (

@@ -1,4 +1,4 @@
-"""Questions that share a query: each has an answer of its own time, and its own answer."""
+"""Requests that share a query: each gets an answer no older than itself, and its own answer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.api.batched import BatchedQueries
 
 @dataclass(slots=True)
 class Source:
-    """Something that changes; a query of it can be held up after it has read."""
+    """A changing value; a query of it can be delayed after it has read."""
 
     value: int = 0
     queries: list[list[str]] = field(default_factory=list)
@@ -51,7 +51,7 @@ def test_those_who_ask_while_a_query_runs_share_the_next_one(source: Source) -> 
 
 
 def test_no_answer_is_older_than_its_question(source: Source) -> None:
-    """Who asks while a query runs waits for the next one: this one has read already."""
+    """A request during a query waits for the next one: the current one has already read."""
 
     async def ask() -> tuple[str | None, ...]:
         together = BatchedQueries(source.ask)

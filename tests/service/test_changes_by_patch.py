@@ -1,4 +1,4 @@
-"""Satellites and ground stations are changed in place, and imports know them again."""
+"""Satellites and ground stations are changed in place, and later imports recognise them."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_priorities_and_the_name_of_a_catalogue_change(service: Service) -> None
     assert answer.json()["name"] == "Places"
     targets = client.get(f"{where}/targets").json()["items"]
     assert {one["id"]: one["reward"] for one in targets} == {"a": 0.0, "b/~c": 7.5, "d": 1.0}
-    # Who has read it before the change is told so.
+    # A client that read it before the change is refused.
     late = client.patch(where, json={"rewards": {"d": 2}}, headers=seen)
     assert_problem(late, 412, "precondition_failed")
     assert client.get(where).headers["etag"] == answer.headers["etag"]

@@ -32,7 +32,7 @@ def action(number: int) -> Document:
 
 
 def timeline_of(*num_actions: int) -> Document:
-    """Return a timeline of satellites with so many actions."""
+    """Return a timeline of satellites with these numbers of actions."""
     numbers = iter(range(sum(num_actions)))
     satellites = [
         {

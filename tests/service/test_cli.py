@@ -1,4 +1,4 @@
-"""The command line: what it refuses, what it prints, and with which status it ends."""
+"""The command line: what it refuses, what it prints, and its exit status."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COMMANDS = (
 
 @pytest.fixture(autouse=True)
 def _own_logging() -> Iterator[None]:
-    """Commands log to the standard error of their time, which ends with the test."""
+    """Commands log to the current standard error, which is replaced after the test."""
     root = logging.getLogger()
     handlers, level = root.handlers[:], root.level
     yield

@@ -25,7 +25,7 @@ A_QUARTER = {"start": "2019-01-01T00:00:00Z", "end": "2019-01-01T06:00:00Z"}
 def scenario(tmp_path: Path) -> Path:
     mission = paper_mission(drawn_targets(150), use_resources=False, horizon=A_QUARTER)
     path = tmp_path / "scenario.json"
-    # What it says of spacing itself does not matter.
+    # The file's own spacing does not matter.
     path.write_text(json.dumps(mission | {"collect_spacing_s": 7.0}))
     return path
 
@@ -82,7 +82,7 @@ def test_what_is_wrong_is_told_by_its_place(
 def test_no_row_is_worse_than_the_one_above(
     scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, again: str
 ) -> None:
-    """Later searches find little, as where time is short; those from a plan all or nothing."""
+    """Later searches find little, as if time were short; those from a plan find all or nothing."""
     num_searches = 0
 
     def poor(request: PlanRequest, budget: Budget) -> PlanAnswer:
@@ -102,7 +102,7 @@ def test_no_row_is_worse_than_the_one_above(
     with table.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     rewards = [float(row["reward"]) for row in rows]
-    assert num_searches == 6  # nothing starts from a plan where collects start anywhere
+    assert num_searches == 6  # with continuous starts no search starts from a plan
     assert rewards[0] > 3
     if again == "certified":
         assert rewards[1] > rewards[0]

@@ -1,4 +1,4 @@
-"""Orbits out over HTTP, and in again."""
+"""Orbits exported over HTTP, and imported again."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def message() -> list[str]:
 
 
 def scenario(client: httpx.Client, satellite_id: str, horizon: dict[str, str]) -> dict[str, Any]:
-    """Return the body of a scenario of one target."""
+    """Return the body of a scenario with one target."""
     catalog = post(client, "/v1/target-catalogs", {"name": "c", "targets": [target()]})
     station = post(client, "/v1/ground-stations", ground_station())
     return {
@@ -57,7 +57,7 @@ def test_the_ephemeris_comes_back_as_a_file(client: httpx.Client) -> None:
     again = send(client, IMPORT, text, "text/plain").json()
     assert [(one["id"], one["status"]) for one in again["items"]] == [(item["id"], "unchanged")]
     assert_problem(client.get(f"{path}/omm.json"), 406, "not_acceptable")
-    # Of all satellites only those with elements are told.
+    # Only satellites with elements are reported.
     assert client.get("/v1/satellites/omm.json").json() == []
 
 

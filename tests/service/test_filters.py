@@ -1,4 +1,4 @@
-"""Lists that are narrowed by a part of a name, a satellite, a ground station."""
+"""Lists filtered by a part of a name, a satellite, a ground station."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_lists_are_narrowed_by_satellite_and_station(stored: Stored, kind: str) 
     assert found(satellite_id=stored.eyes[0]) == {"first", "both"}
     assert found(station_id=stored.stations[1]) == {"second", "both"}
     assert found(satellite_id=stored.eyes[0], station_id=stored.stations[1]) == {"both"}
-    # A satellite is no station, whatever its id.
+    # A satellite is not a station, whatever its id.
     assert found(station_id=stored.eyes[0]) == set()
     assert found(satellite_id="nobody") == set()
 

@@ -1,4 +1,4 @@
-"""Forecasts over HTTP: stored for their owner, frozen with questions, told in answers."""
+"""Forecasts over HTTP: stored for their owner, frozen with scenarios, reported in answers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LONGITUDES = range(0, 360, 15)
 
 
 def clear(hour: int, lat_deg: float, lon_deg: float) -> float:
-    """Return some sky."""
+    """Return an arbitrary clear-sky probability."""
     wave = np.sin(np.radians(lon_deg + 12.0 * hour)) * np.cos(np.radians(2.0 * lat_deg))
     return round(float(0.5 + 0.5 * wave), 4)
 
@@ -103,7 +103,7 @@ def test_a_question_takes_along_what_a_forecast_says_of_its_targets(client: http
     for target_id, values in series["clear_probability"].items():
         lat, lon = targets[target_id]["lat_deg"], targets[target_id]["lon_deg"]
         assert values == pytest.approx([clear(h, lat, lon) for h in (0, 3, 6)], abs=1e-3)
-    # The question is its own: what becomes of the forecast changes nothing in it.
+    # The scenario has its own copy: changing the forecast changes nothing in it.
     client.delete(f"{PATH}/{made['id']}")
     assert client.get(path).json() == file
     assert sha256_of(canonical(file)) == stored["sha256"]

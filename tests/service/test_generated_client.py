@@ -1,4 +1,4 @@
-"""A client that a generator made of the OpenAPI document plans a mission, by a key."""
+"""A client generated from the OpenAPI document plans a mission, using a key."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def generated(service_url: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Return the name of a package made of the document that the service shows."""
+    """Return the name of a package generated from the service's OpenAPI document."""
     folder = tmp_path_factory.mktemp("generated")
     document = folder / "openapi.json"
     document.write_text(httpx.get(f"{service_url}/openapi.json", trust_env=False, timeout=120).text)
-    # It would format the files by a linter of its own choice.
+    # It would format the files with a linter of its own choice.
     (folder / "config.yml").write_text(json.dumps({"post_hooks": []}))
     made = subprocess.run(
         [sys.executable, "-m", "openapi_python_client", "generate", "--path", document,
@@ -147,7 +147,7 @@ def sent(client: Any, generated: str, operation: str, **fields: Any) -> Any:
 
 
 def read_and_import(call: Callable[..., Any], generated: str) -> None:
-    """Send files as bytes, which is all that generated clients know of them."""
+    """Send files as bytes, the only form that generated clients support."""
 
     def file(text: str) -> Any:
         return part(generated, "types").File(payload=io.BytesIO(text.encode()))

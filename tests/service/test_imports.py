@@ -1,4 +1,4 @@
-"""What is imported is never looked through for garbage."""
+"""Garbage collection never scans imported modules."""
 
 from __future__ import annotations
 

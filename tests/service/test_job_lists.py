@@ -1,4 +1,4 @@
-"""Lists of jobs take as long as their page, not as long as there are jobs."""
+"""The time for a list of jobs depends on its page, not on the number of jobs."""
 
 from __future__ import annotations
 

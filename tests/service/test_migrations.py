@@ -1,4 +1,4 @@
-"""Data that an older version has written, as this one finds it."""
+"""Data written by an older version, as this version reads it."""
 
 from __future__ import annotations
 
@@ -124,6 +124,6 @@ def test_going_back_and_forth_loses_no_figures(database: Database, revision: str
     move(database, command.upgrade, "head")
     with database.reading() as session:
         found = session.scalar(sa.select(JobResultRow.figures))
-    # What an earlier version did not know is missing there, and null here.
+    # Fields unknown to an earlier version are missing there, and null here.
     assert found is not None
     assert figures == dict.fromkeys(figures) | found

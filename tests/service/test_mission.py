@@ -1,4 +1,4 @@
-"""The whole service as a user meets it: real processes, real data, faults in the middle."""
+"""The whole service as a user meets it: real processes, real data, faults in between."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.missions import (
 )
 from tests.patience import PATIENCE_S, wait_until
 
-# There is one satellite of a catalogue number.
+# Only one satellite may have a catalogue number.
 _NUMBERS = itertools.count(90_001)
 FINAL = ("succeeded", "failed", "cancelled", "expired")
 LONG = {"depth": 9, "breadth": 5}
@@ -86,7 +86,7 @@ class Service:
         return [c for c in children if "service.jobs" in c.cmdline()]
 
     def busy_workers(self) -> list[psutil.Process]:
-        """Return the workers that have a job's process, a child of their fork server."""
+        """Return the workers that run a job's process, a child of their fork server."""
         return [w for w in self.workers() if any(child.children() for child in w.children())]
 
 
@@ -109,7 +109,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 
 
 def post_mission(service: Service, targets: list[Document], **flags: Any) -> Document:
-    """Send the paper's satellite, its stations and targets, and ask the scenario."""
+    """Store the paper's satellite, its stations and targets, and create the scenario."""
     omm = PAPER_ORBIT | {"NORAD_CAT_ID": next(_NUMBERS)}
     satellite = service.post("/v1/satellites", {"name": "PAPER", "omm": omm, "spacecraft": "paper"})
     stations = [service.post("/v1/ground-stations", station)["id"] for station in STATIONS]
@@ -186,7 +186,7 @@ def test_cancelling_a_running_job_takes_two_seconds_and_keeps_the_plan(service: 
     began_s = time.monotonic()
     assert service.http.post(f"/v1/jobs/{job_id}/cancel").status_code == 202
     job = service.until(job_id, "cancelled")
-    # What is promised of a machine with nothing else to do; on a busy one all takes longer.
+    # The promise is for an idle machine; on a busy one everything takes longer.
     assert time.monotonic() - began_s < max(2.0, whole_job_s)
     assert job["termination"] == "cancelled"
     timeline = service.get(f"/v1/jobs/{job_id}/timeline")
@@ -198,7 +198,7 @@ def test_cancelling_a_running_job_takes_two_seconds_and_keeps_the_plan(service: 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answers:
-    """One question, and the timelines of every solver: of two jobs, and of a file."""
+    """One scenario, and every solver's timelines: of two jobs, and of a file."""
 
     scenario: Document
     timelines: dict[str, list[Document]]
@@ -208,7 +208,7 @@ class Answers:
 def answers(
     request: pytest.FixtureRequest, service: Service, tmp_path_factory: pytest.TempPathFactory
 ) -> Answers:
-    """Every job is planned in a process of its own, and the file in one more."""
+    """Plan every job in a process of its own, and the file in another."""
     scenario = post_mission(service, drawn_targets(60, seed=3), use_resources=request.param)
     jobs = [(solver, service.submit(scenario["id"], solver)) for solver in [*SOLVERS, *SOLVERS]]
     folder = tmp_path_factory.mktemp("file")

@@ -1,4 +1,4 @@
-"""Whatever is sent, the answer is a problem document, and the server holds no more than it may."""
+"""Whatever is sent, the answer is a problem document, and the server's memory stays limited."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A client that knows nothing but the OpenAPI document gets along with the running service."""
+"""A client that knows only the OpenAPI document can use the running service."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COLLECTIONS = {"other_id": "/v1/jobs"}
 
 
 class Client:
-    """Calls operations by what the document says of them, and keeps what they made."""
+    """Calls operations as the document describes them, and keeps what they created."""
 
     def __init__(self, http: httpx.Client, document: Document):
         self.http = http
@@ -44,12 +44,12 @@ class Client:
                 yield path, operations[method]
 
     def known(self, collection: str, field: str) -> str | None:
-        """Return a field of the newest item of a collection, or None where it has none."""
+        """Return a field of the newest item of a collection, or None if it is empty."""
         items = self.http.get(collection).json()["items"]
         return items[0].get(field, items[0].get("id")) if items else None
 
     def path(self, template: str, operation: Document) -> str | None:
-        """Return a path with things that exist, or None where there are none yet."""
+        """Return a path with existing ids, or None if there are none yet."""
         path = template
         for parameter in operation.get("parameters", []):
             if parameter["in"] != "path":
@@ -64,11 +64,11 @@ class Client:
         return path
 
     def bodies(self, operation: Document) -> Iterator[tuple[str, Any]]:
-        """Yield an example of each media type that the operation takes."""
+        """Yield an example for each media type that the operation accepts."""
         for media_type, content in operation["requestBody"]["content"].items():
             schema = content["schema"]
             if schema.get("format") == "binary":
-                continue  # JSON has no way to show one
+                continue  # JSON cannot show one
             if "$ref" in schema:
                 name = schema["$ref"].rpartition("/")[2]
                 schema = self.document["components"]["schemas"][name]
@@ -141,7 +141,7 @@ def create_all(client: Client) -> None:
 
 
 def read_all(client: Client) -> None:
-    """Read all there is, each until it is no longer in work, and again with what is known."""
+    """Read everything, each item until it is finished, and again with known ids."""
     for template, operation in client.operations("get"):
         path = client.path(template, operation)
         assert path is not None, template
@@ -160,7 +160,7 @@ def read_all(client: Client) -> None:
 
 
 def read_ephemeris(client: Client, path_of_elements: str) -> None:
-    """Ask for an ephemeris of a satellite that has none, and of one that has."""
+    """Request an ephemeris of a satellite that has none, and of one that has."""
     assert client.http.get(path_of_elements).status_code == 406
     body = {"name": "FD", "oem": lines(*states()), "spacecraft": "paper"}
     made = client.http.post("/v1/satellites", json=body).json()
@@ -209,7 +209,7 @@ def refuse_all(client: Client) -> None:
 
 
 def live_a_plan(client: Client) -> None:
-    """Take a plan from draft to published, and report what was done of it."""
+    """Take a plan from draft to published, and report on its execution."""
     plan = client.http.get("/v1/plans").json()["items"][0]
     moves = f"{plan['links']['self']}/transitions"
     body: Document = {"to": "approved"}

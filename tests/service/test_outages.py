@@ -1,4 +1,4 @@
-"""Outages over files and HTTP: taken along by scenarios, honoured by jobs, gone when deleted."""
+"""Outages over files and HTTP: copied by scenarios, honoured by jobs, gone when deleted."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_a_skip_over_a_span_skips_all_it_touches() -> None:
     station_id = file["ground_stations"][0].get("id") or file["ground_stations"][0]["name"]
     span = {"station_id": station_id, "start": whole[0][0], "end": whole[1][1]}
     assert contacts(skip=[span]) == whole[2:]
-    # The span of one contact, in whole seconds, means that one alone.
+    # The span of one contact, in whole seconds, matches that contact only.
     own = span | {"start": whole[1][0][:19] + "Z", "end": whole[1][1][:19] + "Z"}
     assert contacts(skip=[own]) == [whole[0], *whole[2:]]
     with pytest.raises(InvalidScenario) as caught:

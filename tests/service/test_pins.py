@@ -1,4 +1,4 @@
-"""Pins over files and HTTP: accepted, hashed, refused with their place."""
+"""Pins over files and HTTP: accepted, hashed, refused with a pointer."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def mission(**pins: Any) -> Document:
 
 def test_a_scenario_without_pins_keeps_its_hash() -> None:
     plain = paper_mission(drawn_targets(20))
-    # As it was before there were pins.
+    # As before pins existed.
     known = "a71fdbf590481341cc28bfbd86fbd64fa895abd501d371ae88ec13216d2d9b10"
     assert sha256_of(canonical(plain)) == known
     nothing: list[dict[str, Any]] = [{}, {"keep": []}, {"forbid": [], "block": []}]
@@ -188,7 +188,7 @@ def test_names_stand_for_ids_where_one_has_the_name(service: Service) -> None:
     assert one["pins"]["keep"][0]["station_id"] == station_id
     again = client.post(PATH, json=asked | {"pins": by_id})
     assert again.json()["id"] == one["id"]
-    # A name and its id are one pin.
+    # A name and its id are the same pin.
     twice = asked | {"pins": {"block": named["block"] + by_id["block"]}}
     problem = assert_problem(client.post(PATH, json=twice), 422, "duplicate_pin")
     assert problem["errors"][0]["pointer"] == "/pins/block/1"

@@ -51,7 +51,7 @@ def run(
 
 
 NEAR = {"certified": {"gap": 0.05}, "milp": {"gap": 0.05, "cut_rounds": 5}}
-"""What exact solvers are content with; that they need not prove the last image saves minutes."""
+"""Gaps at which exact solvers may stop; not having to prove the last image saves minutes."""
 
 
 QUALITY = {"off_nadir_deg": [[0, 1], [30, 0.95], [50, 0.8]]}
@@ -86,7 +86,7 @@ def test_timelines_pass_an_independent_check(
     scenario = paper_mission(drawn_targets(num_targets), **flags)
     if num_targets > _FEW:
         answer = run(scenario, solver, **params)
-    else:  # as in the service a job is given what jobs of its scenario have found out before
+    else:  # as in the service a job is given the results of its scenario's earlier jobs
         answer = first = _by_rule(canonical(scenario))
         if solver != "rule":
             answer = run(scenario, solver, first.opportunity_block, first.proof, **params)
@@ -102,7 +102,7 @@ def test_timelines_pass_an_independent_check(
 def test_time_that_is_over_before_the_search_leaves_its_first_plan(
     solver: str, use_resources: bool
 ) -> None:
-    """On a busy machine access alone may take all of it."""
+    """On a busy machine access alone may use up the time."""
     budget = Budget(0.0)
     budget.expire()
     scenario = {**paper_mission(drawn_targets(60, seed=3)), "use_resources": use_resources}
@@ -225,7 +225,7 @@ def test_stored_opportunities_give_the_same_plan_as_computed_ones() -> None:
 def test_the_stored_proof_proves_the_bound(
     solver: str, use_resources: bool, continuous_starts: bool
 ) -> None:
-    """From the file alone: nothing is left of the search that found it."""
+    """From the file alone: nothing remains of the search that found it."""
     scenario = paper_mission(
         drawn_targets(120), use_resources=use_resources, continuous_starts=continuous_starts
     )

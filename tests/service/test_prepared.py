@@ -1,4 +1,4 @@
-"""What ``prepared`` starts is a process like any other."""
+"""A process that ``prepared`` starts is like any other."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothi
 
 @pytest.fixture(autouse=True)
 def _environment_of_the_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Other tests may have left variables in this process: then it would fork nothing."""
+    """Remove variables that other tests left in this process: with them it would fork nothing."""
     _, environment = prepared._server()
     for name in os.environ.keys() - environment.keys():
         monkeypatch.delenv(name)
@@ -72,7 +72,7 @@ def test_its_workers_and_what_jobs_are_forked_from_are_forks_too(tmp_path: Path)
         assert len(workers) == 2
         for worker in workers:
             fork_servers = [each for each in worker.children() if "-c" not in each.cmdline()]
-            assert len(fork_servers) == 1  # beside what tracks resources
+            assert len(fork_servers) == 1  # apart from the resource tracker
             for each in (worker, *fork_servers):
                 assert prepared.__name__ in each.cmdline()
         started = psutil.Process(process.pid).children(recursive=True)

@@ -1,4 +1,4 @@
-"""Every code that the sources can answer with is explained."""
+"""Every error code that the sources can return is explained."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import planner_core
 import service
 from service.problems.kinds import KINDS
 
-COMMAND_LINE = {"solve.py"}  # answers no problem documents
+COMMAND_LINE = {"solve.py"}  # returns no problem documents
 RAISING = {"Fault", "ServiceError", "InvalidElements", "InvalidScenario", "InvalidParameters"}
 
 

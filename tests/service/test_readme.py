@@ -1,4 +1,4 @@
-"""The walks through the API, in the README and its own page, run as they are printed."""
+"""The walk-throughs of the API, in the README and on a page of their own, run as printed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _walk(page: str, url: str) -> str:
 
 
 def _lasting(output: str) -> list[str]:
-    """Return the lines of an output without what differs from run to run: ids, hashes, seconds."""
+    """Return the lines of an output without what varies between runs: ids, hashes, seconds."""
     lines, timed = [], frozenset[int]()
     for line in _OWN_ID.sub("id", output).strip().splitlines():
         cells = re.split(r"\s{2,}", line.strip())
@@ -55,7 +55,7 @@ def _lasting(output: str) -> list[str]:
         kept = [
             c for i, c in enumerate(cells) if not (timed and len(cells) == width and i in timed)
         ]
-        # The last digits are the machine's.
+        # The last digits depend on the machine.
         lines.append("  ".join(_NUMBER.sub(lambda n: f"{float(n[0]):.4g}", cell) for cell in kept))
     return lines
 
@@ -67,11 +67,11 @@ needs_tools = pytest.mark.skipif(
 
 
 def _output(page: str, tmp_path: Path) -> str:
-    """Return what the commands of a page print on a fresh service; none of them may fail."""
+    """Return the output of a page's commands on a fresh service; none of them may fail."""
     (tmp_path / "service").symlink_to(ROOT / "service")
     for name, lines in OWN_FILES.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-    # The README's walk begins as a user would.
+    # The README's walk-through begins as a user would.
     begin = serving_as_installed if page == "README.md" else serving
     with begin(tmp_path, "serve", "--workers", "1") as (_, line):
         ran = subprocess.run(
@@ -102,7 +102,7 @@ def test_every_command_of_the_walk_works(tmp_path: Path) -> None:
 
 
 def _told_and_shown(page: str, printed: str) -> list[tuple[str, str]]:
-    """Return what blocks print, each with what the page says that it prints."""
+    """Return the output of each block, with the page's output for it."""
     told = printed.split(f"{MARK}\n")
     pairs = zip(told, (shown for _, shown in _blocks(page)), strict=False)
     return [(one, shown) for one, shown in pairs if shown]

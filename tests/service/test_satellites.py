@@ -295,7 +295,7 @@ def test_a_catalogue_number_is_taken_once(client: httpx.Client) -> None:
     lines = "\n".join(tle(epoch=EPOCH + timedelta(days=1)))
     imported = send(client, "/v1/satellites/import", lines, "text/plain").json()
     assert [item["id"] for item in imported["items"]] == [first["id"]]
-    # Who deletes the first may have another one.
+    # After deleting the first one, another one may take its number.
     assert client.delete(f"/v1/satellites/{first['id']}").status_code == 204
     assert client.post("/v1/satellites", json=satellite(tle=tle())).status_code == 201
 

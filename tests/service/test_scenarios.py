@@ -56,7 +56,7 @@ def question(client: httpx.Client, **fields: Any) -> dict[str, Any]:
 
 
 def get(client: httpx.Client, path: str, **params: str) -> httpx.Response:
-    """Get what may still have to be computed (and compiled, at first)."""
+    """Get an answer that may still have to be computed (and at first compiled)."""
     while (response := client.get(path, params=params or None)).status_code == 503:
         assert response.json()["code"] == "still_computing"
         assert int(response.headers["retry-after"]) > 0

@@ -1,8 +1,8 @@
 """Schemathesis over the whole OpenAPI document: no 5xx, and every answer as declared.
 
-What is checked, and what is not and why, stands in ``schemathesis.toml``. By default the cases
-are the same at every run, and few in the quick profile; ``SLEWLINE_TEST_EXAMPLES=500`` draws so
-many new ones for each call, and prints the seed where one fails.
+What is checked, and what is not and why, is in ``schemathesis.toml``. By default the cases are
+the same in every run, and few in the quick profile; ``SLEWLINE_TEST_EXAMPLES=500`` draws that
+many new ones for each call, and prints the seed if one fails.
 """
 
 from __future__ import annotations
@@ -46,21 +46,21 @@ LUCK = {
     ("DELETE", "/v1/jobs/{job_id}"),  # once no comparison has it
     ("POST", "/v1/webhooks/{webhook_id}/deliveries/{delivery_id}/redeliver"),  # before its deletion
 }
-"""Calls that may be refused throughout."""
+"""Calls of which all attempts may be refused."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probed:
-    """A running service with something of everything in it.
+    """A running service that holds something of every kind.
 
     Attributes
     ----------
     document
-        The OpenAPI document, in whose examples ids lead somewhere.
+        The OpenAPI document, with existing ids in its examples.
     folder
-        Has the document and the configuration of Schemathesis.
+        Holds the document and the configuration of Schemathesis.
     log
-        Where the service tells of its calls.
+        The service's access log.
     """
 
     url: str
@@ -69,7 +69,7 @@ class Probed:
     log: Path
 
     def probe(self, *options: str, phases: str, examples: int) -> None:
-        """Let Schemathesis loose on the service; fail with what it has to say."""
+        """Run Schemathesis on the service; fail with its report."""
         command = [sys.executable, "-m", "schemathesis.cli", "--no-color"]
         command += ["--config-file", CONFIG.name, "run", DOCUMENT, "--url", self.url]
         command += ["--warnings", "off", "--output-sanitize", "false", "--continue-on-failure"]
@@ -88,7 +88,7 @@ class Probed:
         assert done.returncode == 0, done.stdout
 
     def served(self) -> set[tuple[str, str]]:
-        """Return the operations that were done, not only refused."""
+        """Return the operations that were served, not only refused."""
         contract = Contract(self.document)
         with self.log.open() as lines:
             calls = [json.loads(line) for line in lines]
@@ -110,7 +110,7 @@ class Probed:
 
 def stored(client: httpx.Client) -> Ids:
     """Store two of everything; return the ids, and the names of the solvers."""
-    # The catalogue number of the example is left to who tries it out.
+    # The example's catalogue number stays free for whoever tries it out.
     example = BODIES["SatelliteIn"]
     numbered = [example | {"omm": example["omm"] | {"NORAD_CAT_ID": n}} for n in NUMBERS]
     ids: Ids = {"satellites": [post(client, "/v1/satellites", body)["id"] for body in numbered]}
@@ -141,7 +141,7 @@ def stored(client: httpx.Client) -> Ids:
 
 
 def with_ids(document: Document, ids: Ids) -> Document:
-    """Return the document with examples that ask for what there is."""
+    """Return the document with examples that refer to existing things."""
     known = {
         "satellite_ids": ids["satellites"][:1],
         "target_catalog_ids": ids["catalogs"][:1],
@@ -167,9 +167,9 @@ def finished(client: httpx.Client, comparison_id: str) -> str:
 
 @pytest.fixture(scope="module")
 def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Probed]:
-    """A service on a machine of one's own: nobody needs a key."""
+    """A service on one's own machine: no key is needed."""
     folder = tmp_path_factory.mktemp("probed")
-    # Whatever is planned in between shall end soon.
+    # Whatever is planned meanwhile must end soon.
     limits = {"default_time_s": "1", "max_time_s": "2"}
     with serving(folder, "serve", "--workers", "1", **limits) as (_, line):
         url = line.split()[-1]
@@ -194,7 +194,7 @@ def guarded(own: Probed) -> Iterator[Probed]:
 
 
 def test_every_answer_is_declared_where_a_key_is_shown(guarded: Probed) -> None:
-    """And whoever asks often has every operation served."""
+    """With enough examples every operation is served at least once."""
     if not is_full():
         guarded.probe(*SHOWN, phases="examples,fuzzing", examples=1)
         return

@@ -19,7 +19,7 @@ from tests.plain_http import NO_TLS
 from tests.service.serving import serving_as_installed
 
 
-# Both signals ask for the same: `.ci/run` sends the second one too.
+# Both signals request the same: `.ci/run` sends the second one too.
 @pytest.mark.parametrize(
     "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.full_size)]
 )
@@ -37,7 +37,7 @@ def test_serve_says_once_when_it_is_ready_and_ends_cleanly(
         assert len(children) >= 1
         _, alive = psutil.wait_procs(children, timeout=PATIENCE_S)
         assert alive == []
-    # It waits for its workers by asking itself: that is not worth a line each time.
+    # It waits for its workers by calling itself: that is not worth a line each time.
     waits = [line for line in (tmp_path / "serve.log").read_text().splitlines() if "/ready" in line]
     assert [json.loads(line)["status"] for line in waits] == [200, 200]
 
@@ -57,7 +57,7 @@ def test_api_alone_runs_no_worker_and_ends_without_its_fork_server(tmp_path: Pat
         (fork_server,) = psutil.Process(process.pid).children()
         (heavy,) = fork_server.children()
         assert (fork_server.name(), heavy.name()) == ("slewline-fork", "slewline-heavy")
-        # Nobody would start a new heavy process: whoever supervises the service shall.
+        # Nothing would start a new heavy process: the service's supervisor must restart everything.
         fork_server.kill()
         assert process.wait(PATIENCE_S) == 1
         _, alive = psutil.wait_procs([heavy], timeout=PATIENCE_S)

@@ -1,4 +1,4 @@
-"""A solver's dataclass is the one source of what its parameters may be."""
+"""A solver's dataclass is the one source of its valid parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Spacecraft types: built in and one's own, what satellites take from them, and what files say."""
+"""Spacecraft types: built in and user-defined, what satellites take from them, and in files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.service.factories import post, satellite, send, target, tle
 
 
 def bare(**fields: Any) -> dict[str, Any]:
-    """Return a satellite that says nothing of what it can do."""
+    """Return a satellite without any of its capabilities."""
     return {"name": "EYE-1", "tle": tle()} | fields
 
 

@@ -1,4 +1,4 @@
-"""DBOS finds the clock that it wants in every SQLite."""
+"""DBOS finds the clock function that it needs in every SQLite."""
 
 from __future__ import annotations
 

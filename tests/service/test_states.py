@@ -1,4 +1,4 @@
-"""States of satellites over files and HTTP: part of the question, and where plans begin."""
+"""States of satellites over files and HTTP: part of the scenario, and the start of plans."""
 
 from __future__ import annotations
 

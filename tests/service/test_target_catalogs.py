@@ -1,4 +1,4 @@
-"""Target catalogues over HTTP: three formats, every bad row named, nothing half-stored."""
+"""Target catalogues over HTTP: three formats, every bad row named, none partly stored."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a file is, told by what it begins with."""
+"""The type of a file, recognised by its beginning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenario files: the same question has one canonical form; what is wrong has a pointer."""
+"""Scenario files: equal scenarios have one canonical form; faults have a pointer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.service.factories import ground_station, target, tle
 
 
 def satellite(**fields: Any) -> dict[str, Any]:
-    """Return the same satellite each time, but for these fields."""
+    """Return the same satellite each time, except for these fields."""
     return factories.satellite(tle=tle()) | fields
 
 
@@ -136,7 +136,7 @@ def test_another_question_has_another_hash(other: dict[str, Any]) -> None:
 
 
 def test_questions_frozen_by_earlier_versions_keep_their_hash() -> None:
-    """Made before targets had times and sensors a type."""
+    """Created before targets had times and sensors a type."""
     stations = {"ground_stations": [ground_station()], "collect_spacing_s": 15.0}
     assert [sha256_of(canonical(file(**fields))) for fields in ({}, stations)] == [
         "ec8499406a946db350eb7b5ce64364c2a4fe4aa70ce8da18c9db220a82c98b7b",

@@ -1,4 +1,4 @@
-"""What goes over HTTP has one shape, closed for who writes it and open for who reads it."""
+"""Messages over HTTP have one shape, closed for writers and open for readers."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def models() -> Iterator[type[BaseModel]]:
 
 
 def parts(annotation: Any) -> Iterator[Any]:
-    """Yield a type and all that it is made of."""
+    """Yield a type and all its component types."""
     yield annotation
     for part in get_args(annotation):
         yield from parts(part)
@@ -98,7 +98,7 @@ def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
 
 
 def routes() -> list[APIRoute]:
-    """Return the calls of our own API: what STAPI answers with is its community's."""
+    """Return the calls of our own API: STAPI's shapes are its community's."""
     own = (r for r in ROUTERS if r is not stapi.router)
     return [route for r in own for route in r.routes if isinstance(route, APIRoute)]
 
@@ -124,7 +124,7 @@ def test_every_call_answers_with_models_of_the_wire() -> None:
 
 @pytest.mark.parametrize("model", sorted(set(models()), key=str))
 def test_every_model_is_closed(model: type[BaseModel]) -> None:
-    # Settings are looked up by name, which is checked where they are applied.
+    # Settings are looked up by name, which is checked when they are applied.
     expected = "allow" if model is changes.RelaxIn else "forbid"
     assert issubclass(model, Wire)
     assert model.model_config["extra"] == expected
@@ -141,7 +141,7 @@ def test_the_client_reads_the_shapes_that_are_written() -> None:
     for shape in shapes:
         own = {base for base in shape.__mro__ if base in known and base is not Wire}
         assert own, shape
-        # What the client adds is no field that the service would have to send.
+        # A field that the client adds is not one that the service would have to send.
         declared = {name for one in own for name in one.model_fields}
         added = shape.model_fields.keys() - declared
         assert not [name for name in added if shape.model_fields[name].is_required()]

@@ -1,4 +1,4 @@
-"""A server that asks for keys, on SQLite or the PostgreSQL server that is named."""
+"""A server that requires keys, on SQLite or the given PostgreSQL server."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Door:
     jobs: Jobs
 
     def token(self, scope: str, owner: str = "ops", expires_days: float = 1.0) -> str:
-        """Make a key and return its token."""
+        """Create a key and return its token."""
         with self.jobs.database.transaction() as session:
             _, token = key_store.create(
                 session,
@@ -44,7 +44,7 @@ class Door:
         return token
 
     def key(self, scope: str, owner: str = "ops") -> dict[str, str]:
-        """Make a key and return the headers that show it."""
+        """Create a key and return the headers that present it."""
         return {"Authorization": f"Bearer {self.token(scope, owner)}"}
 
     def submit(self, key: dict[str, str], **fields: Any) -> str:
@@ -60,7 +60,7 @@ MakeDoor = Callable[..., AbstractContextManager[Door]]
 
 @pytest.fixture
 def make_door(jobs: Jobs) -> MakeDoor:  # noqa: F811 - a fixture is used by its name
-    """Return what runs a server with some settings changed."""
+    """Return a function that runs a server with some settings changed."""
 
     @contextmanager
     def make(**changes: Any) -> Iterator[Door]:
@@ -77,14 +77,14 @@ def make_door(jobs: Jobs) -> MakeDoor:  # noqa: F811 - a fixture is used by its 
 
 @pytest.fixture
 def door(make_door: MakeDoor) -> Iterator[Door]:
-    """A server on this machine that asks for keys."""
+    """A server on this machine that requires keys."""
     with make_door(require_keys=True) as door:
         yield door
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Desk:
-    """A server whose jobs have answers, and the calls that move plans."""
+    """A server whose jobs have answers, and the calls that move plans between states."""
 
     door: Door
     mission: Mission
@@ -107,7 +107,7 @@ class Desk:
         return found
 
     def move(self, plan: Document, to: str, key: dict[str, str], **fields: Any) -> httpx.Response:
-        """Ask for a transition."""
+        """Request a transition."""
         address = f"/v1/plans/{plan['id']}/transitions"
         return self.door.client.post(address, json={"to": to} | fields, headers=key)
 

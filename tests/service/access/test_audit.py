@@ -1,4 +1,4 @@
-"""Every change leaves its event, in the same transaction, and the event stays."""
+"""Every change records its event in the same transaction, and the event stays."""
 
 from __future__ import annotations
 
@@ -297,7 +297,7 @@ def test_a_change_that_cannot_be_recorded_does_not_happen(door: Door) -> None:
         session.execute(sa.text("ALTER TABLE audit_event RENAME TO elsewhere"))
     refused = door.client.post("/v1/ground-stations", json=ground_station(), headers=key)
     assert refused.status_code >= 500
-    # On a connection of its own: the server closes one that a failure was answered on.
+    # On a connection of its own: after a failure the server closes the connection.
     listed = httpx.get(f"{door.client.base_url}/v1/ground-stations", headers=key)
     assert listed.json()["items"] == []
 

@@ -1,4 +1,4 @@
-"""What browsers are told: who may call, what a page may do, what is kept."""
+"""Headers for browsers: who may call, what a page may do, and what is cached."""
 
 from __future__ import annotations
 

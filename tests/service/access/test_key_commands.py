@@ -1,4 +1,4 @@
-"""``slewline keys``, and serving others once there is one."""
+"""``slewline keys``, and serving other hosts once a key exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A caller can ask who it is taken for: pages warn of keys that allow too much."""
+"""A caller can look up its own identity: pages warn about keys that allow too much."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jobs belong to the owner of the key that sent them; nobody else knows of them."""
+"""Jobs belong to the owner of the key that submitted them; other owners do not see them."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_a_job_of_another_owner_is_not_unchanged_either(door: Door) -> None:
 
 
 def test_polls_at_once_are_answered_to_each_owner_for_itself(door: Door) -> None:
-    """They share a query and, of the same job, an answer."""
+    """Their polls share a query and, for the same job, an answer."""
     keys = {owner: door.key("submit", owner) for owner in ("ops", "science")}
     paths = {owner: f"/v1/jobs/{door.submit(key)}" for owner, key in keys.items()}
     calls = [

@@ -1,4 +1,4 @@
-"""The passes of a plan: against its contacts and recorder, as JSON, table and calendar."""
+"""The passes of a plan, compared with its contacts and recorder, as JSON, table and calendar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans with a life: who may move them where, what is in force, and what was reported."""
+"""Plans and their states: who may make which transition, what is in force, what was reported."""
 
 from __future__ import annotations
 
@@ -166,12 +166,12 @@ def test_each_violation_wants_a_waiver(desk: Desk) -> None:
          "actions": ["a1"], "detail": f"The {code} is too short."}
         for code in ("slew", "slew", "battery", "duplicate")
     ]  # fmt: skip
-    head = json.loads(desk.mission.chunks[0].text + "]}")
+    head = json.loads(desk.mission.blocks[0].text + "]}")
     head |= {"violations": broken, "validity": "violations"}
     text = json.dumps(head)[: -len("]}")]
-    chunks = (replace(desk.mission.chunks[0], text=text), *desk.mission.chunks[1:])
-    plan = desk.draft(key, desk.answered_job(key, chunks))
-    # A target imaged twice breaks nothing.
+    blocks = (replace(desk.mission.blocks[0], text=text), *desk.mission.blocks[1:])
+    plan = desk.draft(key, desk.answered_job(key, blocks))
+    # A target imaged twice is no violation.
     assert [each["code"] for each in plan["violations"]] == ["slew", "slew", "battery"]
     refused = desk.move(plan, "approved", key)
     assert len(assert_problem(refused, 422, "waiver_missing", "/waivers")["errors"]) == 3
@@ -267,7 +267,7 @@ def test_a_plan_that_is_not_in_force_is_deleted_for_good(desk: Desk) -> None:
 
 
 def test_each_transition_is_told_and_the_audit_says_whose_it_was(desk: Desk) -> None:
-    """Two controllers of one owner: one plans, one approves; all five states of two plans."""
+    """Two controllers of one owner: one plans, one approves; two plans cover all five states."""
     planner, lead = desk.door.key("submit"), desk.door.key("approve")
     boss = desk.door.key("admin", "boss")
     events = [f"plan.{state}" for state in ("draft", *_LATER)]

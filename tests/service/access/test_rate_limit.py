@@ -1,4 +1,4 @@
-"""Requests are counted by key, or by address where there is none."""
+"""Requests are counted per key, or per address if there is no key."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""No key is in a log, in an error or in what workers are told."""
+"""No key appears in a log, in an error or in a request to workers."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_request_is_logged_with_the_id_of_its_key(
     key = door.key("read", "science")
     with caplog.at_level(logging.INFO, "service.access"):
         door.client.get("/v1/jobs", headers=key | {"X-Request-ID": "this-one"})
-        # The line is written once the answer is out.
+        # The line is written after the answer is sent.
         door.jobs.until(lambda: "service.access" in [one.name for one in caplog.records])
     (record,) = [one for one in caplog.records if one.name == "service.access"]
     fields = json.loads(JsonFormatter().format(record))

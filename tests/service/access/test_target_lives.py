@@ -1,4 +1,4 @@
-"""How far targets have come, over plans that are published, replaced and reported on."""
+"""The progress of targets over plans that are published, replaced and reported on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ START = "2019-01-01T00:00:00.000Z"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shift:
-    """A desk with a catalogue of the mission's targets, and a key that may do all."""
+    """A desk with a catalogue of the mission's targets, and a key with all rights."""
 
     desk: Desk
     key: dict[str, str]
@@ -48,7 +48,7 @@ class Shift:
         assert answer.status_code == 201, answer.text
 
     def collects(self) -> list[tuple[Document, Document]]:
-        """Return satellite and action of each image that comes down."""
+        """Return satellite and action of each image that is downlinked."""
         return [
             (satellite, action)
             for satellite in self.desk.mission.document["satellites"]

@@ -1,4 +1,4 @@
-"""Clients of real services: one whole as ``slewline serve`` runs it, and one with a queue alone."""
+"""Clients of real services: one as ``slewline serve`` runs it, and one with a queue only."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def stored(service: Service) -> Iterator[Client]:
 
 @pytest.fixture
 def proxy(queue_http: httpx.Client) -> Iterator[Proxy]:
-    """A proxy before the service with a queue, where nobody works unless a test starts it."""
+    """A proxy before the service with a queue, which has no workers unless a test starts one."""
     with proxy_before(str(queue_http.base_url).rstrip("/")) as proxy:
         yield proxy
 

@@ -1,4 +1,4 @@
-"""What becomes of requests when connections break: seen from both ends of a broken line."""
+"""What happens to requests when connections break, seen from both ends."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_nobody_there_is_told_with_the_address(monkeypatch: pytest.MonkeyPatch) 
         assert "secret" not in f"{error.value} {client!r}"
 
 
-# Each change comes when the one before was heard of, so that none depends on who is faster.
+# Each change follows once the previous one was received, so that no order depends on timing.
 def test_a_stream_of_events_that_breaks_is_taken_up_where_it_broke(
     patient: Client, proxy: Proxy, jobs: Jobs
 ) -> None:

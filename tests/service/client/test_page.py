@@ -1,4 +1,4 @@
-"""The page on the client, run as it is printed, and what it shows held against what comes out."""
+"""The page on the client: its code is run as printed, and its output compared with the page's."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _run_command(line: str, folder: Path) -> str:
 
 
 def _without_seconds(text: str) -> list[str]:
-    """Return lines in which the seconds of a run, with the room they take, are left out."""
+    """Return lines without the seconds of a run and the space they take."""
     return [re.sub(r" +\d+\.\d{3} +\d+\.\d{2} ", " ", line) for line in text.splitlines()]
 
 

@@ -1,4 +1,4 @@
-"""``slewline plan``: a scenario file to a real service, its plan back."""
+"""``slewline plan``: send a scenario file to a real service and get its plan."""
 
 from __future__ import annotations
 

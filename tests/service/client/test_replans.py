@@ -1,4 +1,4 @@
-"""A day's plan that is published, hit by events and replanned, over a whole service."""
+"""A published day's plan, changed by events and replanned, on a whole service."""
 
 from __future__ import annotations
 
@@ -242,7 +242,7 @@ def test_pins_and_rewards_hold_in_the_new_plan(whole: Client, base: Plan) -> Non
     assert rewards[kept.target_id] == 7.5
     assert len(content["pins"]["keep"]) == 2
 
-    # What was pinned once is let go where the next replan says so.
+    # An earlier pin is released if the next replan says so.
     again = replanned(whole, draft, skip=[pin(kept)], keep=[pin(skipped)])
     held = {place(a) for a in whole.plans.actions(again.id)}
     assert {place(skipped), place(contact)} <= held
@@ -270,7 +270,7 @@ def place(action: PlanAction) -> tuple[Any, ...]:
 
 
 def _told(client: Client, plan: Plan, at: datetime) -> dict[str, Any]:
-    """Return what telemetry would tell at an instant if all went as planned."""
+    """Return the telemetry at an instant if everything went as planned."""
     timeline = client.jobs.timeline(plan.job_id)
     curve = timeline.satellites[0].resources
     assert curve is not None
@@ -285,7 +285,7 @@ def _told(client: Client, plan: Plan, at: datetime) -> dict[str, Any]:
 
 @pytest.fixture
 def flown(whole: Client) -> Plan:
-    """A published plan of its own, which reports may be added to."""
+    """A separate published plan, to which reports may be added."""
     job = whole.jobs.submit(paper_mission(drawn_targets(60)), "certified", time_s=20).wait()
     plan = whole.plans.create(job.id, name="Flown")
     whole.plans.approve(plan.id)
@@ -293,7 +293,7 @@ def flown(whole: Client) -> Plan:
 
 
 def test_a_replan_goes_on_from_telemetry(whole: Client, flown: Plan) -> None:
-    """What begins before the freeze stays to the bit; what was imaged is not imaged again."""
+    """Actions before the freeze stay identical; imaged targets are not imaged again."""
     actions = sorted(whole.plans.actions(flown.id), key=lambda a: a.start)
     now = noon(flown)
     freeze = now + timedelta(hours=1)
@@ -322,7 +322,7 @@ def test_a_replan_goes_on_from_telemetry(whole: Client, flown: Plan) -> None:
     assert on_board == imaged
     assert timeline.totals.bound is not None
     assert timeline.totals.reward <= timeline.totals.bound + 1e-6
-    # From that draft on goes another one, by what was flown since the same telemetry.
+    # Another replan continues from that draft, with what was flown since the same telemetry.
     whole.plans.approve(draft.id)
     whole.plans.publish(draft.id, effective_from=now)
     later = freeze + timedelta(hours=2)
@@ -400,7 +400,7 @@ def test_telemetry_that_cannot_be_is_refused_with_its_place(whole: Client, flown
 
 
 def test_newest_elements_keep_what_is_frozen_at_its_instants(whole: Client, flown: Plan) -> None:
-    """Of satellites that are not stored any more nothing newer is known: they stay as they are."""
+    """For satellites that are no longer stored nothing newer is known: they stay as they are."""
     draft = replanned(whole, flown, elements="newest", freeze_until=noon(flown))
     assert scenario_of(whole, draft)["replan"]["elements"] == "newest"
     assert tasks(whole, draft).keys() == tasks(whole, flown).keys()

@@ -1,4 +1,4 @@
-"""What the client puts in and reads back, on the real service."""
+"""Resources that the client stores and reads back, on the real service."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A proxy before a real service, on which connections fail as they are told to."""
+"""A proxy before a real service, on which connections fail on command."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _OF_ONE_CONNECTION = {"connection", "transfer-encoding", "content-length", "date
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A request that came in."""
+    """A received request."""
 
     method: str
     path: str
@@ -27,12 +27,12 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class LostAnswer:
-    """The service gets the request and answers; the connection breaks before the answer."""
+    """The service receives the request and answers; the connection breaks before the answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The service never hears of the request."""
+    """The proxy answers; the service never sees the request."""
 
     status: int
     headers: Mapping[str, str] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """The connection breaks as soon as the answer has come so far."""
+    """The connection breaks as soon as enough of the answer has passed."""
 
     is_far_enough: Callable[[bytes], bool]
 
@@ -50,7 +50,7 @@ Fault = LostAnswer | Answer | Cut
 
 
 class Proxy(ThreadingHTTPServer):
-    """Passes requests on to a service; the faults planned for a call strike one after the other."""
+    """Passes requests on to a service; the faults planned for a call occur one after the other."""
 
     daemon_threads = True
 
@@ -62,15 +62,15 @@ class Proxy(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Where it listens."""
+        """The proxy's address."""
         return f"http://127.0.0.1:{self.server_address[1]}"
 
     def plan(self, method: str, ending: str, *faults: Fault) -> None:
-        """Let the next calls fail whose path ends so."""
+        """Let the next calls fail whose path has this ending."""
         self._planned += [(method, ending, fault) for fault in faults]
 
     def take(self, method: str, path: str) -> Fault | None:
-        """Return the fault that strikes this request."""
+        """Return the fault for this request, if any."""
         for position, (of_method, ending, fault) in enumerate(self._planned):
             if of_method == method and path.endswith(ending):
                 del self._planned[position]
@@ -127,7 +127,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(b"%x\r\n%b\r\n" % (len(chunk), chunk))
             self.wfile.flush()
             if fault is not None and fault.is_far_enough(so_far):
-                return  # without the last chunk: the other side can tell
+                return  # without the last chunk, so that the other side notices
         if has_body:
             self.wfile.write(b"0\r\n\r\n")
 

@@ -13,7 +13,7 @@ def rings() -> list[list[tuple[float, float]]]:
 
 
 def is_land(lon_deg: float, lat_deg: float) -> bool:
-    """Count the shores between a place and the south."""
+    """Return whether a point is on land, by counting the shores between it and the south."""
     crossings = 0
     for ring in rings():
         for (x1, y1), (x2, y2) in zip(ring, ring[1:] + ring[:1], strict=True):

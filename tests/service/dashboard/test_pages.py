@@ -1,4 +1,4 @@
-"""The dashboard's pages as files: addresses, headers, sound HTML, and nothing from elsewhere."""
+"""The dashboard's pages as files: addresses, headers, valid HTML, and nothing from other hosts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FIELDS = {"input", "select", "textarea"}
 
 
 class Page(HTMLParser):
-    """Collects what a page is made of, and what is wrong with how it is nested."""
+    """Collects a page's elements, and errors in their nesting."""
 
     def __init__(self, text: str):
         super().__init__()
@@ -137,7 +137,7 @@ def test_every_id_that_a_script_asks_for_is_on_its_page() -> None:
 
 
 def _with_imports(name: str) -> str:
-    """Return a script together with all that it imports."""
+    """Return a script together with all its imports."""
     found: dict[str, str] = {}
     left = [name]
     while left:

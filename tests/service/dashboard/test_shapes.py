@@ -17,7 +17,7 @@ from tests.missions import drawn_targets, paper_mission
 from tests.service.conftest import contract
 
 TYPES = Path(__file__).resolve().parents[3] / "service" / "dashboard" / "static" / "types.js"
-# Of documents that the OpenAPI document leaves open: held against a real plan.
+# Documents that the OpenAPI document leaves open: compared with a real plan.
 OF_TIMELINE = {
     "Timeline", "Totals", "TimelineSatellite", "ResourceCurves", "Action", "Slew", "Violation",
 }  # fmt: skip

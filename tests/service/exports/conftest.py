@@ -23,7 +23,7 @@ from tests.service.answers import answered_of
 from tests.service.conftest import Service
 from tests.service.test_plan_job import run
 
-# A recorder that six images fill, so that there are many contacts.
+# A recorder that holds only six images, so that there are many contacts.
 RESOURCES: Document = {
     "battery_capacity_wh": 100.0,
     "sunpoint_power_w": 60.0,
@@ -54,7 +54,7 @@ class Mission:
 
     @property
     def told(self) -> list[Document]:
-        """What became of each target."""
+        """The outcome of each target."""
         told: list[Document] = json.loads(self.targets)
         return told
 

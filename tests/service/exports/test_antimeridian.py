@@ -1,4 +1,4 @@
-"""Lines cut at the antimeridian: nothing is lost, nothing jumps over the map."""
+"""Lines cut at the antimeridian: nothing is lost, nothing jumps across the map."""
 
 from __future__ import annotations
 

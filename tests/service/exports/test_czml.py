@@ -26,7 +26,7 @@ def packets(answered: Answered) -> dict[str, Document]:
 
 
 def lagrange(packet: Document, t_s: float) -> np.ndarray:
-    """Return a sampled position as a client works it out: degree and the samples around."""
+    """Return a sampled position as a client computes it, from the degree and the samples around."""
     position = packet["position"]
     samples = np.array(position["cartesian"]).reshape(-1, 4)
     number = position["interpolationDegree"] + 1

@@ -71,7 +71,7 @@ RFC_7946: Document = {
                 },
             },
         },
-        # Section 7.1: what other types of object define must not appear.
+        # Section 7.1: members defined for other types of object must not appear.
         "coordinates": False,
         "geometries": False,
         "geometry": False,

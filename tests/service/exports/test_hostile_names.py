@@ -1,4 +1,4 @@
-"""Names made to break files: every form is read by a parser of somebody else's, names unharmed."""
+"""Names made to break files: a third-party parser reads every form, with names unharmed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HOSTILE = (
 
 @pytest.fixture(scope="module")
 def hostile() -> tuple[Mission, Answered]:
-    """A mission in which everything that has a name or an id of its own has a hostile one."""
+    """A mission in which everything with a name or an id of its own has a hostile one."""
     file = mission_file()
     stations, targets = file["ground_stations"], file["targets"]
     for number, name in enumerate(HOSTILE):

@@ -1,4 +1,4 @@
-"""A huge answer: a page reads its own chunks, and no form holds the answer as a whole."""
+"""A huge answer: a page reads only its own blocks, and no form holds the answer as a whole."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.answers.chunks import NUM_ITEMS, target_chunks
-from service.db.rows import JobChunkRow
+from service.answers.blocks import NUM_ITEMS, target_blocks
+from service.db.rows import JobBlockRow
 from service.exports.forms import FORMS
 from tests.missions import Document
-from tests.service.answers import chunks_of_timeline
+from tests.service.answers import blocks_of_timeline
 from tests.service.conftest import Service
 from tests.service.exports.conftest import Mission, store_job
 
 NUM_TARGETS = 12_000
 NUM_LEFT_OUT = 4_000
 BLOCK_BYTES = 100_000
-"""About what a chunk of this answer takes."""
+"""Approximate size of a block of this answer."""
 NUM_HELD = 30
-"""Chunks that may be held at a time, as text and as what is made of them (a track is the most)."""
+"""Blocks in memory at a time, as text and as objects made of them (tracks need most)."""
 
 
 OTHERS = [
@@ -32,7 +32,7 @@ OTHERS = [
     for form in FORMS
     if form.suffix != "czml"
 ]
-"""Forms that take less at a time than tracks do."""
+"""Forms that need less memory at a time than tracks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class Large:
 
 
 def large_mission(mission: Mission) -> Mission:
-    """Return a question and an answer of the same form as a mission's, and much larger."""
+    """Return a scenario and an answer of the same form as a mission's, but much larger."""
     file, timeline = json.loads(mission.content), mission.document
     place = file["targets"][0]
     file["targets"] = [
@@ -67,22 +67,22 @@ def large_mission(mission: Mission) -> Mission:
         targets.append(told | rest)
     timeline["satellites"][0]["actions"] = actions
     timeline["satellites"][1]["actions"] = []
-    chunks = (*chunks_of_timeline(timeline), *target_chunks(targets))
+    blocks = (*blocks_of_timeline(timeline), *target_blocks(targets))
     content = json.dumps(file, sort_keys=True, separators=(",", ":"))
-    return Mission(content=content, chunks=chunks)
+    return Mission(content=content, blocks=blocks)
 
 
 @pytest.fixture
 def large(service: Service, mission: Mission) -> Large:
     found = large_mission(mission)
-    size = sum(len(chunk.text) for chunk in found.chunks)
+    size = sum(len(block.text) for block in found.blocks)
     path = store_job(service, found)
     return Large(path=path, question_size=len(found.content), answer_size=size)
 
 
 def spoil_targets(service: Service, *firsts: int) -> None:
-    """Make all chunks of targets unreadable but those that begin with these numbers."""
-    row = JobChunkRow
+    """Make all blocks of targets unreadable except those that begin with these numbers."""
+    row = JobBlockRow
     with service.database.transaction() as session:
         others = sa.and_(row.kind == "targets", row.first.not_in(firsts))
         session.execute(sa.update(row).where(others).values(text="no JSON"))
@@ -91,7 +91,7 @@ def spoil_targets(service: Service, *firsts: int) -> None:
 
 
 def cursor_to(client: httpx.Client, path: str, after: int, limit: int) -> str:
-    """Return the cursor of the page that begins behind so many targets."""
+    """Return the cursor of the page that begins after this number of targets."""
     cursor = None
     for _ in range(after // limit):
         query = {"limit": limit} | ({"cursor": cursor} if cursor else {})
@@ -129,11 +129,11 @@ def test_no_form_holds_the_answer_as_a_whole(
     client: httpx.Client, large: Large, suffix: str
 ) -> None:
     assert large.answer_size > 2 * NUM_HELD * BLOCK_BYTES
-    # The question is held as text where targets have a place; all else is held by the chunk.
+    # Forms that show targets' positions hold the scenario as text; all else is held by the block.
     question = 0 if suffix == "json" else large.question_size
-    # Not the client that holds answers against their schema: it reads them whole.
+    # Not the client that checks answers against their schema: it reads them whole.
     address = client.base_url.join(f"{large.path}/timeline.{suffix}")
-    # What is made once, at the first request, is no part of an answer.
+    # Whatever is created once, at the first request, does not count.
     with httpx.stream("GET", address, timeout=60) as first:
         for _ in first.iter_bytes():
             pass

@@ -1,4 +1,4 @@
-"""Every form of a plan that begins with images on board: they come down in its contacts."""
+"""Every form of a plan that begins with images on board: its contacts downlink them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MBIT = 60.0
 
 @pytest.fixture(scope="module")
 def followed() -> Mission:
-    """A plan whose first satellite has two images of before on board."""
+    """A plan whose first satellite has two earlier images on board."""
     file = mission_file()
     begin = file["horizon"]["start"]
     first, second = (target["id"] for target in file["targets"][:2])
@@ -41,7 +41,7 @@ def followed() -> Mission:
 
 @pytest.fixture(scope="module")
 def old(followed: Mission) -> dict[str, Document]:
-    """The images of before, by target, as the timeline tells of them; both come down."""
+    """The earlier images, by target, as in the timeline; both are downlinked."""
     line = next(each for each in followed.document["satellites"] if each["id"] == SATELLITE)
     told = {image["target_id"]: image for image in line["on_board"]}
     assert len(told) == 2

@@ -1,4 +1,4 @@
-"""Round trips: what is written can be read, and is the same plan by its hash."""
+"""Round trips: what is written can be read, and has the same plan hash."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_plans_of_every_kind_of_scenario_come_back(solver: str, flags: dict[str,
 def test_answers_of_the_first_release_are_read_and_exported(
     mission: Mission, answered: Answered
 ) -> None:
-    """Stored before images had a worth and a quality of their own."""
+    """Stored before images had their own worth and quality."""
     stored = mission.document
     del stored["totals"]["quality_mean"]
     actions = [action for satellite in stored["satellites"] for action in satellite["actions"]]

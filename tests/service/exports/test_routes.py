@@ -1,4 +1,4 @@
-"""The forms of a timeline over HTTP: by suffix, by ``Accept``, once and again."""
+"""The forms of a timeline over HTTP: by suffix, by ``Accept``, and repeated."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_every_form_names_targets(client: httpx.Client, job_path: str) -> None:
     assert {one["target_name"] for one in taken if one["target_id"] == named} == {name}
     assert {one["target_name"] for one in taken if one["target_id"] != named} == {None}
     rows = list(csv.DictReader(io.StringIO(client.get(f"{job_path}/timeline.csv").text)))
-    # A cell is no formula.
+    # No cell is a formula.
     assert {r["target_name"] for r in rows if r["target_id"] == f"'{named}"} == {f"'{name}"}
     told = client.get(f"{job_path}/targets", params={"target_id": named}).json()["items"]
     assert [one["target_name"] for one in told] == [name]

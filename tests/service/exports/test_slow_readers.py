@@ -1,4 +1,4 @@
-"""Readers that take a byte of an export at a time."""
+"""Readers that take one byte of an export at a time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TINY_BUFFER = 2048
 
 @contextmanager
 def reading_a_byte_at_a_time(client: httpx.Client, path: str) -> Iterator[None]:
-    """Ask for an answer and take one byte of it, with room for no more than a few."""
+    """Request an answer and take one byte of it, with buffers for no more than a few."""
     address = urlsplit(str(client.base_url))
     with socket.socket() as peer:
         peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TINY_BUFFER)
@@ -31,7 +31,7 @@ def test_slow_readers_of_exports_hold_up_nobody(client: httpx.Client, job_path: 
         for _ in range(READERS):
             slow = reading_a_byte_at_a_time(client, f"{job_path}/timeline.czml")
             readers.enter_context(slow)
-        # More than there are threads: who waited for one of them would wait for ever.
+        # More than there are threads: if each held one, the next would wait for ever.
         assert client.get(f"{job_path}/timeline.czml").text == whole
         made = client.post("/v1/jobs/none/cancel")
         assert made.status_code == 404

@@ -1,4 +1,4 @@
-"""Grids between their points, against an interpolation that goes point by point."""
+"""Grids between their points, compared with a point-by-point interpolation."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def drawn_grid(
 
 
 def slowly(grid: Grid, time: int, lat_deg: float, lon_deg: float) -> float:
-    """Return what two straight lines along a row, and one between them, make of four corners."""
+    """Return the bilinear interpolation of the four corners around a point."""
     columns = [*grid.lon_deg.tolist()]
     values = grid.value[time].astype(float) / WHOLE
     if columns[-1] + (columns[1] - columns[0]) - columns[0] >= 359.999:

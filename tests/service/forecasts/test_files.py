@@ -1,4 +1,4 @@
-"""Forecasts as files: what is read, and what is refused with its place."""
+"""Forecast files: what is read, and what is refused, with the position of the fault."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def netcdf(
     calendar: str | None = None,
     **attributes: Any,
 ) -> bytes:
-    """Return a file; latitudes descend as weather services write them."""
+    """Return a file; latitudes descend as in weather services' files."""
     values = np.asarray(values)
     own: dict[str, Any] = {
         "time": [0.0, 3.0],

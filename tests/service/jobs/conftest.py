@@ -1,4 +1,4 @@
-"""A database with the queue in it, jobs to put there, and real worker processes."""
+"""A database with the queue in it, functions to submit jobs, and real worker processes."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ SUMMARY = {
     "counts": {"satellites": 0, "targets": 0, "ground_stations": 0},
     "warnings": (),
 }
-"""Of a scenario without content, which can be listed and shown."""
+"""Summary of a scenario without content, which can be listed and shown."""
 
 SERVER_URL = os.environ.get("SLEWLINE_TEST_SERVER_URL")
-"""A PostgreSQL server that these tests may fill with databases; without it they use SQLite."""
+"""A PostgreSQL server in which these tests may create databases; without it they use SQLite."""
 
-# No file of SQLite can hang as a server does.
+# A SQLite file cannot hang like a server.
 collect_ignore = [] if SERVER_URL else ["test_hanging_server.py"]
 
 
@@ -92,7 +92,7 @@ class Jobs:
         return job_id
 
     def job(self, job_id: str) -> JobRow:
-        """Return the job as it stands."""
+        """Return the job's current row."""
         with self.database.reading() as session:
             return session.get_one(JobRow, job_id)
 
@@ -106,7 +106,7 @@ class Jobs:
         return None if timeline is None else (timeline, f"[{targets}]")
 
     def end_searches(self) -> None:
-        """Let searches that run, and that are begun from now on, come to their own end."""
+        """Let current and future searches come to their own end."""
         (self.folder / "over").touch()
 
     def starts(self) -> list[str]:
@@ -150,7 +150,7 @@ class Workers:
 
 @pytest.fixture(scope="session")
 def template_url(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A migrated database, to be copied: a SQLite file, or on the server that is named."""
+    """A migrated database, to be copied: a SQLite file, or on the given server."""
     folder = tmp_path_factory.mktemp("template")
     url = f"sqlite:///{folder / 'jobs.db'}"
     if SERVER_URL is not None:
@@ -168,7 +168,7 @@ def _copy(template_url: str, folder: Path) -> str:
 
 
 def create_database(server_url: str, template: str) -> str:
-    """Make a database on a server, a copy of ``template``, and return its URL."""
+    """Create a database on a server as a copy of ``template``, and return its URL."""
     name = f"slewline_{new_id().replace('-', '')}"
     engine = sa.create_engine(server_url, isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
@@ -208,14 +208,14 @@ def stored_jobs(template_url: str, folder: Path) -> Iterator[Jobs]:
 
 @pytest.fixture
 def jobs(template_url: str, tmp_path: Path) -> Iterator[Jobs]:
-    """A database of its own."""
+    """A separate database with jobs."""
     with stored_jobs(template_url, tmp_path) as jobs:
         yield jobs
 
 
 @pytest.fixture
 def client(jobs: Jobs) -> Iterator[httpx.Client]:
-    """A client of a server that sends jobs to the queue, with nobody to run them."""
+    """A client of a server that sends jobs to the queue, without workers."""
     app = new_app(jobs.settings, jobs.queue)
     with serve(app) as address, checked_client(address) as client:
         yield client
@@ -223,7 +223,7 @@ def client(jobs: Jobs) -> Iterator[httpx.Client]:
 
 @pytest.fixture(autouse=True)
 def supervised(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have supervisors in this process start their workers as forks too."""
+    """Make supervisors in this process start their workers as forks too."""
 
     def start(command: list[str], **options: Any) -> Program:
         _python, _m, *words = command
@@ -235,7 +235,7 @@ def supervised(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def workers(jobs: Jobs) -> Iterator[Workers]:
-    """Starts workers; whatever still runs at the end is killed."""
+    """A starter of workers; whatever still runs at the end is killed."""
     started = Workers(jobs)
     yield started
     for process in started.processes:
@@ -252,5 +252,5 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mission]:
 
 @pytest.fixture(scope="package")
 def planned(mission: Mission) -> Document:
-    """A job that has planned the small mission; nobody changes it."""
+    """A job that has planned the small mission; no test changes it."""
     return mission.plan(small_mission())

@@ -23,7 +23,7 @@ HIDDEN = "hidden/one"
 
 
 def small_mission(**flags: Any) -> Document:
-    """Return half a day of the paper's mission: ids with odd characters, one without access."""
+    """Return half a day of the paper's mission: unusual ids, one target without access."""
     targets = drawn_targets(300)
     targets[0]["id"] = ODD
     targets[1] |= {"id": HIDDEN, "off_nadir_max_deg": 5.0, "off_nadir_min_deg": 5.0}
@@ -32,7 +32,7 @@ def small_mission(**flags: Any) -> Document:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mission:
-    """A running service; every answer is held against its OpenAPI document."""
+    """A running service; every answer is checked against its OpenAPI document."""
 
     http: httpx.Client
 
@@ -42,7 +42,7 @@ class Mission:
         return self.ended(self.http.post("/v1/jobs", json=body))
 
     def ended(self, accepted: httpx.Response, state: str = "succeeded") -> Document:
-        """Return the job that was accepted, at its end."""
+        """Return the accepted job once it has ended."""
         assert accepted.status_code == 202, accepted.text
         deadline_s = time.monotonic() + PATIENCE_S
         while True:
@@ -53,21 +53,21 @@ class Mission:
             assert time.monotonic() < deadline_s, job
 
     def what_if(self, job: Document, **change: Any) -> httpx.Response:
-        """Ask for the same question with a change."""
+        """Request a what-if with a change."""
         return self.http.post(f"/v1/jobs/{job['id']}/what-if", json=change)
 
     def timeline(self, job: Document) -> Document:
-        """Return what was planned."""
+        """Return the planned timeline."""
         found: Document = self.http.get(job["links"]["timeline"]).json()
         return found
 
     def targets(self, job: Document) -> dict[str, Document]:
-        """Return what became of each target, by its id."""
+        """Return the outcome of each target, by its id."""
         page = self.http.get(job["links"]["targets"], params={"limit": 500}).json()
         return {target["target_id"]: target for target in page["items"]}
 
     def explain(self, job: Document, target_id: str, **headers: str) -> httpx.Response:
-        """Ask for an explanation."""
+        """Request an explanation."""
         path = f"/v1/jobs/{job['id']}/targets/{quote(target_id, safe='')}/explanation"
         return self.http.get(path, headers=headers)
 

@@ -1,4 +1,4 @@
-"""A TCP proxy before a server, that can stop passing anything on without a word."""
+"""A TCP proxy before a server that can silently stop passing data on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 
 class FreezingProxy:
-    """Passes bytes on in both directions, except while frozen; it accepts connections always.
+    """Passes bytes on in both directions, except while frozen; it always accepts connections.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class FreezingProxy:
         self._flowing.clear()
 
     def thaw(self) -> None:
-        """Pass on what has come meanwhile, and all that comes."""
+        """Pass on what has arrived meanwhile, and whatever follows."""
         self._flowing.set()
 
     def _accept(self) -> None:

@@ -169,7 +169,7 @@ def test_the_figures_are_those_of_the_timeline() -> None:
         "plan_sha256": "ab",
     }
     assert figures_of(timeline) == FIGURES
-    # Answers of the first release do not say what is on the ground.
+    # Answers of the first release do not say what is downlinked.
     older = {k: v for k, v in totals.items() if k not in ("delivered", "age_s")}
     found = figures_of(timeline | {"totals": older})
     assert found == FIGURES | {"delivered": None, "age_s": None}

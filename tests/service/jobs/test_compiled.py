@@ -1,4 +1,4 @@
-"""What is noted of compiled kernels, and what that spares a process."""
+"""The record of compiled kernels, and the work that it saves a process."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_kernels_are_ready_until_a_source_is_edited(monkeypatch: pytest.MonkeyPa
     assert not compiled.is_ready("demonstration")
     monkeypatch.setattr(compiled, "_sources", lambda: "edited")
     assert not compiled.is_ready("all")
-    # Whether the edit reaches a kernel, the stamps tell.
+    # The stamps tell whether the edit affects a kernel.
     assert compiled.stamps("all") == "abc"
 
 

@@ -32,7 +32,7 @@ def used(jobs: Jobs) -> tuple[int, int]:
 
 
 def age(jobs: Jobs, row: type[Any], own_id: str, column: str, days: float) -> None:
-    """Let something have happened so many days ago."""
+    """Make an event appear to have happened this many days ago."""
     then = datetime.now(UTC) - timedelta(days=days)
     with jobs.database.transaction() as session:
         session.execute(sa.update(row).where(row.id == own_id).values({column: then}))

@@ -15,7 +15,7 @@ Key = tuple[str, str, str, str]
 
 @pytest.fixture(scope="module")
 def other(mission: Mission) -> Document:
-    """Another plan of the same question."""
+    """Another plan of the same scenario."""
     return mission.plan(small_mission(), "graph")
 
 

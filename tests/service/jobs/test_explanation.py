@@ -1,4 +1,4 @@
-"""One target explained at length, for a job that a real worker has planned."""
+"""One target explained in detail, for a job that a real worker has planned."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def test_a_target_without_access_is_told_what_would_give_it_one(
     assert wider["satellite_id"] == "PAPER"
     setting = wider["targets"][HIDDEN]
     assert setting.get("off_nadir_max_deg", 0.0) > 5.0
-    # The sensor allows 55 degrees already: only the target's own limit is in the way.
+    # The sensor allows 55 degrees already: only the target's own limit excludes it.
     assert set(wider) == {"satellite_id", "targets"}
 
 
 def test_times_and_sensor_types_of_targets_go_all_the_way(mission: Mission) -> None:
-    """A target is planned within its times; what hides two others is named and can be relaxed."""
+    """A target is planned within its times; what excludes two others is named, and relaxable."""
     scenario = small_mission(use_resources=False)
     first = mission.plan(scenario)
     actions = mission.timeline(first)["satellites"][0]["actions"]

@@ -18,7 +18,7 @@ NUM_SATELLITES = 6
 
 
 def fleet_mission() -> Document:
-    """Return half a day of satellites in planes spread evenly, over the same targets."""
+    """Return half a day of satellites in evenly spread planes, over the same targets."""
     satellites = [
         {
             "name": f"S{i}",

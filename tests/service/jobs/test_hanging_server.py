@@ -1,4 +1,4 @@
-"""A PostgreSQL server that accepts connections and says nothing more: nobody waits for ever."""
+"""A PostgreSQL server that accepts connections and says nothing more: nothing waits for ever."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def proxy(jobs: Jobs) -> Iterator[FreezingProxy]:
 
 
 def through(proxy: FreezingProxy, jobs: Jobs) -> Jobs:
-    """Return the same jobs with settings by which the server is reached through the proxy."""
+    """Return the same jobs with settings that reach the server through the proxy."""
     url = {"database_url": proxy.url, "database_timeout_s": TIMEOUT_S}
     return Jobs(
         settings=jobs.settings.model_copy(update=url),
@@ -47,7 +47,7 @@ def through(proxy: FreezingProxy, jobs: Jobs) -> Jobs:
 
 
 def test_calls_of_a_server_that_hangs_end(proxy: FreezingProxy) -> None:
-    """With a connection that is open, and where one must be opened first."""
+    """With an open connection, and if one must be opened first."""
     engine = make_postgresql_engine(proxy.url, TIMEOUT_S)
     with engine.connect() as connection:
         connection.execute(sa.text("SELECT 1"))
@@ -117,7 +117,7 @@ def test_silence_between_notifications_is_none_of_the_server(jobs: Jobs) -> None
 def test_the_api_answers_503_while_the_server_hangs(
     proxy: FreezingProxy, jobs: Jobs, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """More calls at once than there are threads, and a stream of events that is open."""
+    """More calls at once than there are threads, and an open stream of events."""
     settings = through(proxy, jobs).settings
     queue = DbosQueue(settings.database_url, settings.database_timeout_s)
     app = create_app(settings, queue)
@@ -220,6 +220,6 @@ def test_limits_hold_and_a_worker_ends_while_the_server_hangs(
         for process in workers.processes:
             process.kill()
             process.wait()
-    # Its last words may have come through or not: it is the lease that counts.
+    # Its last messages may or may not have arrived: the lease decides.
     proxy.thaw()
     assert jobs.job(deaf).state in ("running", "failed")

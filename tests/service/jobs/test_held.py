@@ -1,4 +1,4 @@
-"""What a worker holds: within its bounds, and without a part in what is planned."""
+"""What a worker holds: it stays within its limits, and has no influence on plans."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_the_longest_unused_go_first(folder: Path) -> None:
     for i, name in enumerate(("a", "b")):
         held.save(name, 100 * name.encode())
         os.utime(folder / f"{name}.npz", (i, i))
-    assert held.load("a") == 100 * b"a"  # and is used last by that
+    assert held.load("a") == 100 * b"a"  # which makes it the last one used
     held.save("c", 100 * b"c")
     assert held.load("b") is None
     assert (held.load("a"), held.load("c")) == (100 * b"a", 100 * b"c")
@@ -84,7 +84,7 @@ def request(document: Document, **more: object) -> PlanRequest:
 
 
 def follower(document: Document, answer: PlanAnswer) -> Document:
-    """Return the question after an urgent request."""
+    """Return the scenario after an urgent request."""
     (satellite,) = json.loads(answer.timeline)["satellites"]
     base = [
         {
@@ -138,7 +138,7 @@ def test_cold_and_warm_workers_give_the_same_plan(
     assert (warm.reward, warm.bound) == (cold.reward, cold.bound)
     assert warm.opportunity_block == cold.opportunity_block
 
-    # Where nothing is stored either, only the search for a proof differs.
+    # If nothing is stored either, only the search for a proof differs.
     bare = run_plan_job(request(asked), Budget())
     assert computed == [num_targets, 1, 1, num_targets]
     assert bare.reward == pytest.approx(warm.reward)

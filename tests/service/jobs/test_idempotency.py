@@ -111,7 +111,7 @@ def test_a_refused_request_does_not_use_up_its_key(jobs: Jobs) -> None:
         assert keys(jobs) == []
         client.post(f"/v1/jobs/{blocking}/cancel")
         assert send(client, jobs).status_code == 202
-        # A full queue does not stand in the way of an answer that was given.
+        # A full queue does not prevent repeating an earlier answer.
         assert send(client, jobs).headers["idempotency-replayed"] == "true"
 
 

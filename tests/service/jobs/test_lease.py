@@ -99,7 +99,7 @@ def test_a_superseded_dispatch_does_nothing(jobs: Jobs) -> None:
 
 
 def test_a_stale_run_can_neither_renew_nor_finish(jobs: Jobs) -> None:
-    """A worker that was frozen past its lease wakes up: the job is no longer its own."""
+    """A worker frozen past its lease wakes up: the job is no longer its own."""
     job_id = jobs.submit("answer")
     stale = started(jobs, job_id, lease_s=-1.0)
     owner = started(jobs, job_id)
@@ -128,7 +128,7 @@ def test_progress_changes_the_version_and_a_bare_renewal_does_not(jobs: Jobs) ->
 
 
 def test_each_change_of_state_is_a_version_of_its_own(jobs: Jobs) -> None:
-    """Who watches a job is told by its ETag that something has changed."""
+    """A client that watches a job sees every change in its ETag."""
     job_id = jobs.submit("answer")
     versions = [jobs.job(job_id).version]
     held = started(jobs, job_id)

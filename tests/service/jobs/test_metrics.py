@@ -102,7 +102,7 @@ def test_orbits_in_use_tell_their_age(client: httpx.Client, jobs: Jobs) -> None:
     ages = {key: value for key, value in read(client).items() if key[0] == mine[0]}
     assert set(ages) == {mine}
     assert ages[mine] == pytest.approx((now - EPOCH).total_seconds(), abs=60.0)
-    # Planned long ago and over: no longer in use.
+    # Its horizon is over: no longer in use.
     client.post(f"/v1/jobs/{job}/cancel")
     with jobs.database.transaction() as session:
         old = utc_now(-timedelta(days=8).total_seconds())

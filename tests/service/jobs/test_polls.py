@@ -1,4 +1,4 @@
-"""Polls of jobs, which share queries and answers: as true as if each were alone."""
+"""Polls of jobs share queries and answers, and are as correct as if each were alone."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def told(answer: httpx.Response) -> tuple[int, dict[str, str], bytes]:
 
 
 def test_a_poll_is_answered_as_the_route_would(client: httpx.Client, jobs: Jobs) -> None:
-    """The route itself answers where there is a query."""
+    """With a query string the route itself answers."""
     job_id = posted(client, jobs, label="é", params={})
     path = f"/v1/jobs/{job_id}"
 
     def compare() -> None:
         by_route = client.get(path, params={"wait": 0})
         assert by_route.status_code == 200
-        for _ in range(2):  # written, and kept from the first time
+        for _ in range(2):  # rendered, then cached
             assert told(client.get(path)) == told(by_route)
         other = client.get(path, headers={"If-None-Match": '"0"'})
         assert told(other) == told(by_route)
@@ -46,7 +46,7 @@ def test_a_poll_is_answered_as_the_route_would(client: httpx.Client, jobs: Jobs)
 
 
 def test_no_poll_is_told_less_than_was_known_when_it_came(client: httpx.Client, jobs: Jobs) -> None:
-    """Many follow a job that changes all the time; who has just changed it sees the change."""
+    """Many clients follow a job that keeps changing; each sees its own latest change."""
     job_id = posted(client, jobs)
     path = f"/v1/jobs/{job_id}"
     held = start(jobs, job_id)
@@ -101,7 +101,7 @@ def test_polls_at_once_are_told_of_their_own_jobs(client: httpx.Client, jobs: Jo
 def test_polls_are_refused_as_by_the_routes_while_the_database_is_away(jobs: Jobs) -> None:
     app = new_app(jobs.settings, jobs.queue)
     at_hand = app.state.database
-    # Where a folder stands no file can be opened.
+    # No file can be opened at the path of a folder.
     away = Database(f"sqlite:///{jobs.folder}")
     with serve(app) as address, checked_client(address) as client:
         path = f"/v1/jobs/{posted(client, jobs)}"

@@ -1,4 +1,4 @@
-"""What the queue's library must be helped with."""
+"""Corrections that the queue's library needs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from service.jobs.queue import make_queue_engine
 
 
 def test_a_server_that_is_gone_counts_as_a_lost_connection(tmp_path: Path) -> None:
-    """By this mark DBOS tries again; by the driver's words ("connection is bad") it would not."""
+    """This mark makes DBOS try again; the driver's text ("connection is bad") would not."""
     url = f"postgresql+psycopg://nobody@/none?host={tmp_path}"
     plain, helped = sa.create_engine(url), make_queue_engine(url)
     assert helped is not None

@@ -93,7 +93,7 @@ def test_a_job_being_cancelled_by_a_dead_worker_is_cancelled(jobs: Jobs) -> None
 
 
 def test_a_job_is_not_blamed_for_the_time_when_nobody_could_write(jobs: Jobs) -> None:
-    """After an outage its worker has the time of one lease to renew; then it counts as dead."""
+    """After an outage its worker has one lease's time to renew; then it counts as dead."""
     reconciler = Reconciler(jobs.database, jobs.queue, lease_s=0.4, max_attempts=1)
     reconciler.run()
     job_id = jobs.submit("answer")
@@ -144,7 +144,7 @@ def test_a_claim_on_a_finished_job_is_given_up(jobs: Jobs) -> None:
 
 
 def test_a_waiting_job_that_the_queue_has_forgotten_is_queued_anew(jobs: Jobs) -> None:
-    """A dispatch that ended before its job began would else strand the job for ever."""
+    """A dispatch that ended before its job began would otherwise strand the job for ever."""
     forgotten, waiting = jobs.submit("answer"), jobs.submit("answer")
     set_queue_status(jobs, forgotten, 1, "ERROR", 60.0)
     for job_id in (forgotten, waiting):

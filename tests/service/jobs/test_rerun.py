@@ -1,4 +1,4 @@
-"""A job run again: the same frozen question, a new job."""
+"""A job run again: the same frozen scenario, a new job."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def states(jobs: Jobs) -> dict[str, str]:
 
 
 def pg(program: str, url: str, *options: str) -> None:
-    """Run a program of PostgreSQL on a database: that of the server under test, if it is named."""
+    """Run a PostgreSQL program on a database: from the server under test, if one is given."""
     control = shlex.split(os.environ.get("SLEWLINE_TEST_SERVER_CONTROL", ""))
     folders = [str(Path(word).parent) for word in control if Path(word).name == "pg_ctl"]
     found = shutil.which(program, path=os.pathsep.join([*folders, os.environ["PATH"]]))
@@ -78,7 +78,7 @@ def restored(jobs: Jobs, file: Path) -> Iterator[Jobs]:
 
 @contextmanager
 def busy(jobs: Jobs) -> Iterator[None]:
-    """Let jobs be submitted and done all the time."""
+    """Submit and finish jobs all the time."""
     over = threading.Event()
 
     def keep_on() -> None:
@@ -95,7 +95,7 @@ def busy(jobs: Jobs) -> Iterator[None]:
 
 
 def test_a_backup_of_a_busy_service_restores_to_one_that_ends_every_job(jobs: Jobs) -> None:
-    """One job of the backup runs, others wait or have ended; all its workers are gone."""
+    """One job in the backup is running, others wait or have ended; all its workers are gone."""
     ledger.open_ledger(jobs)
     file = jobs.folder / "backup"
     supervisor = Supervisor(jobs.settings.model_copy(update={"workers": 2}), work=WORK)

@@ -1,4 +1,4 @@
-"""What many want at once and one can have, on each database."""
+"""Things that many clients want at once and only one can have, on each database."""
 
 from __future__ import annotations
 

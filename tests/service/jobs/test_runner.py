@@ -46,7 +46,7 @@ def log(tmp_path: Path) -> Path:
 
 @pytest.fixture(autouse=True)
 def no_process_is_left(log: Path) -> Iterator[None]:
-    """However a run ends, its process is gone."""
+    """Check that however a run ends, its process is gone."""
     yield
     for line in log.read_text().splitlines():
         wait_for_the_end_of(int(line.split()[-1]))
@@ -120,7 +120,7 @@ def test_a_search_that_ignores_its_time_limit_is_killed(
 def test_who_gets_little_of_the_machine_has_longer_to_hand_over_its_plan(
     runner: Runner, log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two seconds by the clock after its limit, and less than one of them computed."""
+    """It ends two seconds of the clock after its limit, but has computed for less than one."""
     monkeypatch.setattr(grace, "GRACE_CPU_S", {"solve": 1.0})
     ending = run(runner, log, "starved", time_s=0.1)
     assert isinstance(ending, Answered)
@@ -194,7 +194,7 @@ def test_a_bug_is_an_internal_error_that_tells_nothing_of_the_inside(
 def test_an_answer_counts_even_when_its_process_is_gone_before_it_is_heard(
     runner: Runner, log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A worker may be held up; limits are judged after the last words have been read."""
+    """A worker may be delayed; limits are judged after the last messages have been read."""
 
     class HeldUp(Watcher):
         def tick(self, progress: Progress | None) -> Order:

@@ -1,4 +1,4 @@
-"""What several writers store at once: on PostgreSQL they really meet."""
+"""Data that several writers store at once: on PostgreSQL they really compete."""
 
 from __future__ import annotations
 

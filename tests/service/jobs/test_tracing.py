@@ -1,4 +1,4 @@
-"""Traces: one from a request to the end of the job that it sent, and nothing where none are."""
+"""Traces: one from a request to the end of its job, and none if tracing is off."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PHASES = ["solve", "verify", "store"]
 
 @pytest.fixture(scope="session")
 def exporter() -> InMemorySpanExporter:
-    """Keeps the spans of this process; OpenTelemetry allows one provider in its life."""
+    """Keeps the spans of this process; OpenTelemetry allows one provider per process."""
     exporter = InMemorySpanExporter()
     provider = TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(exporter))
@@ -52,7 +52,7 @@ def spans(exporter: InMemorySpanExporter) -> Iterator[InMemorySpanExporter]:
 
 @pytest.fixture
 def worker(jobs: Jobs) -> Iterator[Worker]:
-    """A worker in this process, which is handed its jobs by the test."""
+    """A worker in this process, which receives its jobs from the test."""
     worker = Worker(jobs.settings, WORK)
     yield worker
     worker._queue.close()
@@ -132,7 +132,7 @@ def test_phases_follow_each_other_and_a_failure_is_marked(
 ) -> None:
     worker.handle(jobs.submit("slow_to_verify", limits={"time_s": 0.2, "memory_mb": 2048}), 1)
     run = by_name(spans)["run job"]
-    assert run.parent is None  # nobody had asked for a trace when it was queued
+    assert run.parent is None  # no trace was requested when it was queued
     phases = [span for span in spans.get_finished_spans() if span is not run]
     assert [span.name for span in phases] == PHASES
     for before, after in itertools.pairwise(phases):
@@ -200,7 +200,7 @@ def test_nothing_is_loaded_where_nobody_asks() -> None:
 
 
 class Collector(BaseHTTPRequestHandler):
-    """Takes what OTLP exporters send."""
+    """Receives the data of OTLP exporters."""
 
     received: list[ExportTraceServiceRequest] = []  # noqa: RUF012 - of the whole class
 

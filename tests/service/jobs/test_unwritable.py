@@ -1,4 +1,4 @@
-"""A database that is full or read-only: told as such, and nothing is broken when it is over."""
+"""A full or read-only database: reported as such, and nothing is broken afterwards."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_a_read_only_database_is_503_and_serves_again_when_it_can_be_written(
 
 
 def test_a_full_database_is_503_and_keeps_nothing_of_what_did_not_fit(service: Service) -> None:
-    """On SQLite; a server's full disk cannot be played without the server."""
+    """On SQLite; a full disk of a server cannot be simulated without the server."""
     client, engine = service.client, service.database.engine
     catalog = {"name": "many", "targets": MANY_TARGETS}
     with sqlite_pragma(engine, "max_page_count = 1", "max_page_count = 1073741823"):

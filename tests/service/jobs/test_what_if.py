@@ -1,4 +1,4 @@
-"""The same question with a change, planned by a real worker."""
+"""The same scenario with a change, planned by a real worker."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def actions(mission: Mission, job: Document, mode: str) -> list[Document]:
 
 
 def left_out(mission: Mission, job: Document, code: str) -> Document:
-    """Return a target with this code for a reason and a change that settings make."""
+    """Return a target with this reason code and a change of settings that would let it in."""
     return next(
         target
         for target in mission.targets(job).values()

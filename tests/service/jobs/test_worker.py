@@ -49,13 +49,13 @@ def freeze(jobs: Jobs, process: Program) -> None:
 
 
 def _is_stopped(pid: int) -> bool:
-    """Return whether all threads stand still, which on a busy machine is not at once."""
+    """Return whether all threads have stopped, which takes a while on a busy machine."""
     stats = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/stat")]
     return all(stat.rpartition(")")[2].split()[0] == "T" for stat in stats)
 
 
 def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs) -> None:
-    """SIGKILL in the middle of a job: the supervisor's next worker does it, and all end well."""
+    """SIGKILL in the middle of a job: the supervisor's next worker does it, and all end cleanly."""
     supervisor = Supervisor(jobs.settings, work=WORK)
     supervisor.start()
     try:
@@ -82,9 +82,9 @@ def test_a_job_survives_its_worker_and_finishes_once(jobs: Jobs) -> None:
 def test_workers_take_over_from_a_frozen_and_from_a_stopped_one(
     jobs: Jobs, workers: Workers
 ) -> None:
-    """SIGSTOP past the lease: the new owner's result stands, and the old worker lives on.
+    """SIGSTOP past the lease: the new owner's result counts, and the old worker survives.
 
-    SIGTERM: the job is handed back at once, and lost nothing.
+    SIGTERM: the job is handed back at once, and loses nothing.
     """
     frozen = workers.start()
     job_id = jobs.submit("search")
@@ -155,7 +155,7 @@ def test_one_worker_serves_cancels_and_failures_by_priority(jobs: Jobs, workers:
 
 
 def test_a_tenant_leaves_room_for_others(jobs: Jobs, workers: Workers) -> None:
-    """Two workers, one place a tenant: one of them stays free for whoever else comes."""
+    """Two workers, one slot per tenant: one of them stays free for other tenants."""
     jobs.queue.configure(tenant_limit=1, poll_s=0.05)
     giants = [jobs.submit("search", tenant="giant", priority=9) for _ in range(3)]
     for _ in range(2):
@@ -168,7 +168,7 @@ def test_a_tenant_leaves_room_for_others(jobs: Jobs, workers: Workers) -> None:
 
 
 def test_jobs_that_go_too_far_fail_with_their_reason_and_others_live_on(jobs: Jobs) -> None:
-    """Too much memory, too much time, and a job that takes its worker with it."""
+    """Too much memory, too much time, and a job that kills its worker."""
     settings = jobs.settings.model_copy(update={"max_attempts": 2})
     supervisor = Supervisor(settings, work=WORK)
     supervisor.start()
@@ -192,7 +192,7 @@ def test_jobs_that_go_too_far_fail_with_their_reason_and_others_live_on(jobs: Jo
 
 
 def test_a_worker_ends_however_many_signals_come(jobs: Jobs, workers: Workers) -> None:
-    """One signal in the middle of the handling of another must not lock it up."""
+    """A signal during the handling of another one must not cause a deadlock."""
     for _ in range(2):
         process = workers.start()
         for _ in range(300):

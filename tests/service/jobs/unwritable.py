@@ -34,7 +34,7 @@ def sqlite_pragma(engine: sa.Engine, while_broken: str, again: str) -> Iterator[
 
 @contextmanager
 def no_room_for(*pids: int) -> Iterator[None]:
-    """Let no file of these processes grow, as a full disk would; only Linux can do it."""
+    """Let no file of these processes grow, as on a full disk; works only on Linux."""
     for pid in pids:
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (1, NO_LIMIT))
     try:
@@ -46,7 +46,7 @@ def no_room_for(*pids: int) -> Iterator[None]:
 
 @contextmanager
 def read_only_server(server_url: str) -> Iterator[None]:
-    """Let a PostgreSQL server begin read-only transactions only, in all its sessions."""
+    """Make all sessions of a PostgreSQL server begin read-only transactions only."""
     _set_read_only(server_url, "SET default_transaction_read_only = on")
     try:
         yield

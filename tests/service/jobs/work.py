@@ -1,4 +1,4 @@
-"""Things for solver processes to do in tests: the request's ``solver`` names one."""
+"""Work for solver processes in tests: the request's ``solver`` names one."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ EMPTY = {
     "models": {},
     "satellites": [],
 }
-"""A timeline of nothing, with every field that readers may count on."""
+"""An empty timeline with every field that readers rely on."""
 
 WORK = Work(function="tests.service.jobs.work:run", preload="tests.service.jobs.work")
 
 
 def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
-    """Do what the solver's name says; leave a line for each start where params ask for it."""
+    """Do what the solver's name says; log each start if the params ask for it."""
     if "log" in request.params:
         with Path(request.params["log"]).open("a") as log:
             log.write(f"{request.job_id} {request.solver} {os.getpid()}\n")
@@ -77,8 +77,8 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
             time.sleep(1.0)
             return found
         case "hog":
-            # Far beyond the limits of the tests, but not all that the machine has: whoever
-            # watches may be frozen or late.
+            # Far beyond the limits of the tests, but less than the machine has: the watching
+            # process may be frozen or late.
             hoard = [bytearray(os.urandom(1 << 20)) * 16 for _ in range(200)]
             time.sleep(60.0)
             return answer(request, str(len(hoard)))
@@ -107,7 +107,7 @@ def run(request: PlanRequest, budget: Budget) -> PlanAnswer:
 
 
 def compute_now_and_then(*, seconds: float) -> None:
-    """Go on as a process does that gets a small share of the machine."""
+    """Compute as a process that gets a small share of the machine."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         for _ in range(20_000):
@@ -116,7 +116,7 @@ def compute_now_and_then(*, seconds: float) -> None:
 
 
 def search(request: PlanRequest, budget: Budget) -> PlanAnswer:
-    """Get better and better until the budget is spent, or the file is there that params name."""
+    """Improve until the budget is spent, or until the file named by the params exists."""
     steps = 0
     until = Path(request.params.get("until", "/nonexistent"))
     while not (budget.is_spent() or until.exists()):

@@ -1,4 +1,4 @@
-"""A server that keys are shown to, a receiver, and couriers between them."""
+"""A server that requires keys, a webhook receiver, and couriers between them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Post:
         return self.door.jobs
 
     def webhook(self, path: str = "/", owner: str = "ops", **fields: Any) -> dict[str, Any]:
-        """Make a webhook of an owner to a path of the receiver."""
+        """Create a webhook of an owner to a path of the receiver."""
         body = {"url": self.receiver.url + path} | fields
         key = self.door.key("submit", owner)
         response = self.door.client.post("/v1/webhooks", json=body, headers=key)
@@ -40,7 +40,7 @@ class Post:
         return made
 
     def deliveries(self, webhook: dict[str, Any], owner: str = "ops") -> list[dict[str, Any]]:
-        """Return what the API tells of a webhook's deliveries, newest first."""
+        """Return a webhook's deliveries as the API lists them, newest first."""
         key = self.door.key("read", owner)
         answer = self.door.client.get(webhook["links"]["deliveries"], headers=key)
         items: list[dict[str, Any]] = answer.json()["items"]
@@ -53,7 +53,7 @@ class Post:
             return list(session.scalars(wanted))
 
     def until_ended(self, number: int = 1) -> None:
-        """Wait until so many deliveries have ended."""
+        """Wait until this number of deliveries has ended."""
         self.jobs.until(lambda: sum(row.ended_at is not None for row in self.rows()) >= number)
 
 
@@ -72,7 +72,7 @@ StartCourier = Callable[..., AbstractContextManager[Courier]]
 
 @pytest.fixture
 def courier(post: Post) -> StartCourier:
-    """Return what runs a courier with short waits."""
+    """Return a function that runs a courier with short waits."""
 
     @contextmanager
     def run(**changes: Any) -> Iterator[Courier]:

@@ -1,4 +1,4 @@
-"""A real HTTP server that takes webhooks and answers as a test tells it to."""
+"""A real HTTP server that receives webhooks and answers as a test tells it to."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Received:
         return loaded
 
     def is_signed_with(self, secret: str) -> bool:
-        """Check the signature from the words of the specification, with no library of its own."""
+        """Check the signature by the text of the specification, without its library."""
         signed = f"{self.id}.{self.headers['webhook-timestamp']}.".encode() + self.body
         key = base64.b64decode(secret.removeprefix("whsec_"))
         digest = base64.b64encode(hmac.new(key, signed, hashlib.sha256).digest()).decode()
@@ -47,7 +47,7 @@ Answer = tuple[int, dict[str, str]]
 
 @dataclass(slots=True)
 class Receiver:
-    """What came, and what is answered: ``answers`` one by one, then 204; ``hold`` waits first."""
+    """Received requests and planned ``answers``, used one by one, then 204; ``hold`` delays."""
 
     url: str = ""
     received: list[Received] = field(default_factory=list)

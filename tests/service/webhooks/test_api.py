@@ -1,4 +1,4 @@
-"""Making webhooks, looking at them, and what is refused."""
+"""Creating webhooks, reading them, and what is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every end of a job reaches those who asked for it: signed, again and again, and only there."""
+"""Every end of a job is delivered to its subscribers: signed, with retries, and to no one else."""
 
 from __future__ import annotations
 
@@ -206,7 +206,7 @@ def test_no_receiver_at_all_is_told_in_the_delivery(post: Post, courier: StartCo
     assert "ConnectError" in row["last_error"]
 
 
-# As a name, each of these is looked up; the system reads it as 127.0.0.1 or as ::1.
+# Each of these is looked up as a name; the system reads it as 127.0.0.1 or as ::1.
 @pytest.mark.parametrize("host", ["2130706433", "0x7f000001", "127.1", "localhost", "[::1]"])
 def test_private_addresses_are_refused_when_it_comes_to_sending(
     post: Post, courier: StartCourier, host: str
@@ -245,7 +245,7 @@ def test_what_a_dead_courier_had_taken_comes_due_again(post: Post, courier: Star
     with courier():
         post.until_ended()
     with post.jobs.database.transaction() as session:
-        # It was not dead, only slow: what it says now counts no more.
+        # It was not dead, only slow: its report no longer counts.
         outbox.failed(session, taken, "too late", None, again_s=None)
     assert [(row.state, row.attempts) for row in post.rows()] == [("delivered", 2)]
 
@@ -266,7 +266,7 @@ def test_old_deliveries_are_forgotten(post: Post, courier: StartCourier) -> None
 
 
 def test_workers_are_couriers(post: Post) -> None:
-    """A real job, run by a real worker, tells its end to a real receiver."""
+    """A real job, run by a real worker, reports its end to a real receiver."""
     webhook = post.webhook()
     settings = post.jobs.settings.model_copy(update={"webhook_private_addresses": True})
     workers = Workers(dataclasses.replace(post.jobs, settings=settings))

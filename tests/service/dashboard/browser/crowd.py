@@ -16,7 +16,7 @@ START: Final = "2026-03-01T00:00:00Z"
 END: Final = "2026-03-01T12:00:00Z"
 NOON_OF_SHIFT: Final = "2026-03-01T06:00:00Z"
 _FIRST_NUMBER: Final = 95_001
-# Neighbours in Alaska, Florida, Svalbard and Scandinavia stand within a few degrees.
+# Stations in Alaska, Florida, Svalbard and Scandinavia are only a few degrees apart.
 STATIONS: Final = {
     "Svalbard": (78.2, 15.4), "Kiruna": (67.9, 21.1), "Tromso": (69.7, 18.9),
     "Vardo": (70.3, 31.0), "Troll": (-72.0, 2.5), "McMurdo": (-77.8, 166.7),
@@ -27,7 +27,7 @@ STATIONS: Final = {
 }  # fmt: skip
 
 SCREENS: Final = ((1920, 1080), (1280, 720), (1400, 757), (3840, 2160))
-# What lies over the edge of the screen or of its own part of it.
+# Whatever extends beyond the edge of the screen or of its own section.
 CUT_OFF: Final = """
 return [...document.querySelectorAll("#wall tr, #wall canvas, #wall p")].filter((one) => {
   const box = one.getBoundingClientRect();
@@ -39,7 +39,7 @@ return [...document.querySelectorAll("#wall tr, #wall canvas, #wall p")].filter(
 
 
 def show_at(browser: Browser, width: int, height: int) -> None:
-    """Give the page just this room: a window of the size has less."""
+    """Give the page exactly this viewport: a window of this size has less."""
     size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
@@ -52,7 +52,7 @@ def crowded_plan(api: httpx.Client) -> Json:
             "/v1/satellites",
             satellite(
                 name=f"OBSERVER {chr(65 + i // 4)}-{i % 4 + 1}",
-                # Trains of four, five minutes apart, as constellations fly.
+                # Trains of four, five minutes apart, as in real constellations.
                 tle=tle(
                     _FIRST_NUMBER + i, raan_deg=72.0 * (i // 4), mean_anomaly_deg=20.0 * (i % 4)
                 ),

@@ -18,7 +18,7 @@ WITHIN_S = 300.0
 def small_mission(api: httpx.Client) -> str:
     """Store the demonstration's mission once; return the id of its scenario."""
     name = {"name": demo_mission.SATELLITE["name"]}
-    # Tests share a service, which knows a catalogue number once.
+    # Tests share a service, which accepts a catalogue number only once.
     if not api.get("/v1/satellites", params=name).json()["items"]:
         with Client(str(api.base_url), key="") as client:
             return demo.create_mission(client).id
@@ -27,7 +27,7 @@ def small_mission(api: httpx.Client) -> str:
 
 
 def light_mission(api: httpx.Client) -> str:
-    """Store that mission's day over fewer targets, planned and replanned to a proof in no time."""
+    """Store that mission's day over fewer targets, quickly planned and replanned to a proof."""
     small_mission(api)
     names = [demo_mission.SATELLITE["name"], *(s["name"] for s in demo_mission.GROUND_STATIONS)]
     (satellite_id, *station_ids) = (
@@ -80,7 +80,7 @@ def large_mission(api: httpx.Client, num_satellites: int = 12, num_days: int = 7
 def planned(
     api: httpx.Client, scenario_id: str, solver: str = "rule", *, time_s: float = WITHIN_S
 ) -> Json:
-    """Plan a scenario; return the job when it has ended."""
+    """Plan a scenario; return the job once it has ended."""
     body = {"scenario_id": scenario_id, "solver": solver, "limits": {"time_s": time_s}}
     job = post(api, "/v1/jobs", body)
     deadline_s = time.monotonic() + WITHIN_S

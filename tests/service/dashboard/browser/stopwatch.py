@@ -1,10 +1,10 @@
-"""Own satellites to a published plan, in the browser alone, at a person's pace, with a stopwatch.
+"""From own satellites to a published plan, in the browser alone, at a person's pace, timed.
 
     .ci/browser .venv/bin/python -m tests.service.dashboard.browser.stopwatch \
         SATELLITES.tle TARGETS.csv STATIONS.geojson [SOLVER TIME_LIMIT_S]
 
-prints each step with its seconds. Hands and eyes are allowed for by pauses; what the service takes
-is the rest.
+prints each step with its seconds. Pauses stand for a person's hands and eyes; the rest is the
+service's time.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ AIM_S: Final = 1.5
 KEY_S: Final = 0.2
 """To type a letter."""
 CHOOSE_FILE_S: Final = 8.0
-"""To find a file in the dialog of the system, which a test cannot open."""
+"""To find a file in the system's dialog, which a test cannot open."""
 LOOK_S: Final = 10.0
 """To read an answer."""
 
 
 class Walk:
-    """A person before a browser; ``steps`` are names with seconds."""
+    """A person at a browser; ``steps`` are names with seconds."""
 
     def __init__(self, browser: Browser):
         self.browser = browser
@@ -42,7 +42,7 @@ class Walk:
 
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
-        """Take the time of a step."""
+        """Measure the time of a step."""
         began_s = time.monotonic()
         yield
         self.steps.append((name, time.monotonic() - began_s))
@@ -61,7 +61,7 @@ class Walk:
             time.sleep(KEY_S)
 
     def upload(self, kind: str, file: Path) -> None:
-        """Choose a file, and read what is said of it."""
+        """Choose a file, and read the page's summary of it."""
         with self.step(f"Upload {file.name}"):
             time.sleep(AIM_S + CHOOSE_FILE_S)
             self.browser.find(f"#{kind}-file").send_keys(str(file.resolve()))
@@ -108,7 +108,7 @@ def to_a_published_plan(walk: Walk, files: tuple[Path, Path, Path], how: tuple[s
 
 
 def main(satellites: str, targets: str, stations: str, *how: str) -> None:
-    """Start a service that knows nothing, and walk."""
+    """Start an empty service, and walk through."""
     with (
         tempfile.TemporaryDirectory() as folder,
         serving(Path(folder), "serve", "--workers", "1") as (_, line),

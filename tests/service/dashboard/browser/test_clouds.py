@@ -1,4 +1,4 @@
-"""A forecast of clear skies is uploaded and chosen in the form, and the plan goes by it."""
+"""A clear-sky forecast is uploaded and selected in the form, and the plan uses it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CLEAR = {"bern": 0.25, "oslo": 0.75}
 
 
 def take(browser: Browser, file: Path) -> str:
-    """Upload a forecast; return what is said of it."""
+    """Upload a forecast; return the page's summary of it."""
     browser.find("#forecast-file").send_keys(str(file))
     outcome = "#forecast-outcome .notice"
     browser.wait(lambda: browser.text(outcome), "nothing is said of the forecast")

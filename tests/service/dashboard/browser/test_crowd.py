@@ -1,4 +1,4 @@
-"""20 satellites and 18 stations on the pages: names that can be read, paper that can be carried."""
+"""20 satellites and 18 stations on the pages: names stay legible, prints stay short."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ WALL = (1920, 1080)
 MOST_SATELLITES = 15
 MOST_STATIONS = 10
 MOST_PAGES = 2
-# On a screen 1.2 metres wide a line of this size is 12 mm high.
+# On a screen 1.2 metres wide letters of this size are 12 mm high.
 LEAST_LETTERS_PX = 19
 LETTERS_PX = "return parseFloat(getComputedStyle(document.querySelector('#wall td')).fontSize)"
-# Notes where each canvas has text, by the ink of the letters and not by what the page believes.
+# Records where each canvas has text, by the ink of the letters and not by the page's own figures.
 RECORD = """
 const note = CanvasRenderingContext2D.prototype.fillText;
 const clear = CanvasRenderingContext2D.prototype.clearRect;
@@ -53,7 +53,7 @@ CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
 
 @pytest.fixture(scope="module")
 def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A service of its own: plans in force would be seen by other tests."""
+    """A separate service, as other tests would see its plans in force."""
     with serving(tmp_path_factory.mktemp("crowd"), "serve", "--workers", "1") as (_, line):
         yield line.split()[-1]
 
@@ -71,7 +71,7 @@ def plan(api: httpx.Client) -> Json:
 
 @pytest.fixture
 def recorded(browser: Browser) -> Iterator[Browser]:
-    """A browser that notes what is written on canvases."""
+    """A browser that records what is written on canvases."""
     script = browser.driver.execute_cdp_cmd(
         "Page.addScriptToEvaluateOnNewDocument", {"source": RECORD}
     )
@@ -88,7 +88,7 @@ def written(browser: Browser, plot: str) -> list[Json]:
 
 
 def overprinted(texts: list[Json]) -> list[tuple[Any, Any]]:
-    """Return the pairs of texts that lie on each other."""
+    """Return the pairs of texts that overlap."""
     return [
         (a["text"], b["text"])
         for a, b in itertools.combinations(texts, 2)
@@ -131,7 +131,7 @@ def test_what_is_selected_is_named_on_the_map_though_others_are_near(
 
 
 def press(browser: Browser, key: str) -> None:
-    """Press a key on the map, and wait until it is drawn anew."""
+    """Press a key on the map, and wait until it is redrawn."""
     before = browser.drawn("map")
     script = """
       const press = new KeyboardEvent("keydown", {key: arguments[0]});
@@ -185,7 +185,7 @@ def test_a_job_a_plan_and_the_passes_of_a_shift_are_printed_on_two_pages(
     browser.run("window.print = () => {}")
     browser.click("#print-passes")
     assert num_pages(browser) <= MOST_PAGES
-    # Of hundreds of passes paper has those that the shift flies, all of them.
+    # Of hundreds of passes exactly those that the shift flies are printed.
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     try:
         on_paper = [one.is_displayed() for one in rows(browser, "#passes")]

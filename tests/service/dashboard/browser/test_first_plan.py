@@ -1,4 +1,4 @@
-"""What a new user does: upload satellites, targets and stations, plan, read the result."""
+"""A new user's steps: upload satellites, targets and stations, plan, read the result."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TARGETS = [("bern", 46.9, 7.4), ("quito", -0.2, -78.5), ("lagos", 6.5, 3.4), ("o
 
 
 def upload(browser: Browser, kind: str, path: Path, text: str) -> None:
-    """Choose a file, and wait for what the page says of it."""
+    """Choose a file, and wait for the page's summary of it."""
     path.write_text(text, encoding="utf-8")
     browser.find(f"#{kind}-file").send_keys(str(path))
     browser.wait(lambda: "Sending" not in browser.text(f"#{kind} .outcome"))
@@ -37,7 +37,7 @@ def test_from_files_to_a_timeline_in_the_browser_alone(
     browser: Browser, api: httpx.Client, files: Path
 ) -> None:
     fill_in(browser, files)
-    # The orbit is old: its own day is suggested, in the page's form whatever the country.
+    # The orbit is old: its own day is suggested, in the page's format in any locale.
     assert browser.find("#horizon-start").get_attribute("value") == "2026-03-01 00:00:00"
     browser.find("#label").send_keys("first plan")
     browser.find("#collect-spacing").send_keys("60")
@@ -61,7 +61,7 @@ def test_a_file_with_mistakes_is_answered_with_their_lines(browser: Browser, fil
     text = "id,lat_deg,lon_deg\nok,1,2\nfar,95,2\n"
     upload(browser, "targets", files / "bad.csv", text)
     assert "Line 3" in browser.text("#targets .outcome")
-    # The browser itself notes a refusal; nothing else may be there.
+    # The browser itself logs a refusal; nothing else may be logged.
     said = browser.complaints()
     assert len(said) == 1
     assert "422" in said[0]
@@ -80,7 +80,7 @@ def test_a_satellite_is_entered_with_its_own_figures(browser: Browser, api: http
     (stored,) = api.get("/v1/satellites?norad_cat_id=90300").json()["items"]
     assert stored["agility"]["slew_rate_deg_s"] == 2.5
     assert stored["sensor"]["off_nadir_max_deg"] == 40.0
-    # What was left empty is that of the spacecraft's type.
+    # Empty fields take the values of the spacecraft's type.
     assert stored["sensor"]["sun_elevation_min_deg"] == 10.0
     assert browser.run(
         "return document.querySelector(`input[value='${arguments[0]}']`).checked", stored["id"]
@@ -97,7 +97,7 @@ def test_parameters_of_a_solver_come_from_its_schema(browser: Browser, files: Pa
     browser.find("#param-num_simulations").send_keys("7")
     browser.find("#param-depth").send_keys("0")
     browser.click("#send")
-    # Below the schema's minimum: told before anything is sent.
+    # Below the schema's minimum: reported before anything is sent.
     browser.wait(lambda: "depth" in browser.text("#send-outcome"))
     assert browser.driver.current_url.endswith("/new")
     browser.find("#param-depth").clear()

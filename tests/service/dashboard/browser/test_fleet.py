@@ -1,4 +1,4 @@
-"""The fleet page by clicks: satellites, stations and types are changed; a type is made."""
+"""The fleet page by clicks: change satellites, stations and types; create a type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What got in the way of those who tried the first pages: texts, keys, clipped links."""
+"""Obstacles that the first users of the pages met: texts, keys, clipped links."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_clock_moves_while_a_job_runs_and_nothing_else_does(
     job = post(api, "/v1/jobs", body)
     browser.open(f"/jobs/{job['id']}")
     browser.wait(lambda: "Phase solve" in browser.text("#progress-text"), "no phase")
-    # From here on the service tells nothing new.
+    # From here on the service reports nothing new.
     browser.run("window.fetch = () => new Promise(() => {})")
     told = {browser.text("#progress-text")}
 
@@ -64,7 +64,7 @@ def test_a_clock_moves_while_a_job_runs_and_nothing_else_does(
         found = text.search(one)
         assert found, one
         h, m, s, to_go_h, to_go_m, to_go_s = (int(digits) for digits in found.groups())
-        # Two clocks of whole seconds.
+        # Two clocks with whole seconds.
         sum_s = 3600 * (h + to_go_h) + 60 * (m + to_go_m) + s + to_go_s
         assert sum_s in (599, 600)
     api.post(f"/v1/jobs/{job['id']}/cancel").raise_for_status()
@@ -102,7 +102,7 @@ def selects(browser: Browser, action_id: str) -> bool:
     return browser.text("#selected-action").startswith(f"{action_id},")
 
 
-# What is cut off: by the edge of the screen, or by a part of the page that cannot be scrolled.
+# Whatever is cut off: by the edge of the screen, or by a part of the page that does not scroll.
 CLIPPED = """
 return [...document.querySelectorAll("a[href], button, summary")].filter((one) => {
   if (!one.checkVisibility() || one.matches(".skip, .hidden-text")) return false;

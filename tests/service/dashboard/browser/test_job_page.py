@@ -41,7 +41,7 @@ def open_job(browser: Browser, job: Json) -> None:
 
 
 def point_of(browser: Browser, timeline: Json, action: Json) -> tuple[int, int]:
-    """Return where in the Gantt chart an action of the first satellite is."""
+    """Return the position of an action of the first satellite in the Gantt chart."""
     script = """
       const canvas = document.querySelector("#gantt canvas");
       const [start, end, from, to] = [...arguments].map((at) => Date.parse(at));
@@ -95,7 +95,7 @@ def test_an_action_clicked_in_the_chart_is_selected_everywhere(
 ) -> None:
     open_job(browser, job)
     actions = timeline["satellites"][0]["actions"]
-    # One with nothing else within the width of a few pixels.
+    # An action with nothing else within a few pixels.
     collects = [a for a in actions if a["mode"] == "collect"]
     alone = max(collects[1:-1], key=lambda a: gap_around(collects, a))
     before = {plot: browser.drawn(plot) for plot in ("gantt", "curves", "map")}
@@ -234,7 +234,7 @@ def test_the_tables_hold_every_action_and_every_target(
         browser.wait(partial(browser.text, f"{section} tbody tr"))
         browser.click(f"{section} .pager button:last-child")
         rows = f"return document.querySelectorAll('{section} tbody tr').length"
-        # They are made a few at a time.
+        # They are created a few at a time.
         browser.wait(partial(has_value, browser, rows, count))
         assert "(UTC)" in browser.text(f"{section} thead")
 
@@ -332,7 +332,7 @@ def test_solvers_are_compared_from_the_page_of_a_job(
     )
     browser.wait(lambda: "succeeded" in browser.text("#runs tbody tr"))
     for run in runs:
-        api.post(f"/v1/jobs/{run['job_id']}/cancel")  # the long ones need not be waited for
+        api.post(f"/v1/jobs/{run['job_id']}/cancel")  # the long ones need not finish
     browser.wait(lambda: browser.find("#runs").get_attribute("data-state") == "finished")
     (first,) = [r for r in api.get(path).json()["runs"] if r["job_id"] == runs[0]["job_id"]]
     assert f"{first['reward']:g}" in browser.text("#runs tbody tr:first-child")

@@ -1,4 +1,4 @@
-"""Keys in the browser: asked for, taken from a wall display's link, and kept out of sight."""
+"""Keys in the browser: requested, taken from a wall display's link, and kept out of sight."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def locked_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture
 def locked(driver: webdriver.Chrome, locked_url: str) -> Iterator[Browser]:
-    """A page of a service that asks for keys; refusals for want of a key are no complaint."""
+    """A page of a service that requires keys; refusals without a key are no complaint."""
     page = Browser(driver=driver, url=locked_url)
     page.watch()
     yield page
-    # Without workers the service says that it is not ready: the browser notes that, too.
+    # Without workers the service reports that it is not ready: the browser logs that, too.
     expected = ("status of 401", "/health/ready")
     assert [one for one in page.complaints() if not any(e in one for e in expected)] == []
 
@@ -42,9 +42,9 @@ def test_a_wall_displays_link_shows_the_jobs_and_hides_the_key(locked: Browser) 
     assert locked.driver.current_url == f"{locked.url}/"
     locked.wait(lambda: "No jobs yet" in locked.text("main"))
     assert locked.text("#notices") == ""
-    # Nothing to send with.
+    # There is no key to send.
     assert not locked.find("#filters .needs-submit").is_displayed()
-    # The key is in no address that was asked for: not in the server's log either.
+    # The key is in no requested address: not in the server's log either.
     assert [url for url in locked.requests() if READ in url.partition("#")[0]] == []
     locked.open("/new")
     locked.wait(lambda: locked.text("#key-button") == "wall: read")

@@ -1,4 +1,4 @@
-"""Many satellites, many targets: work goes with what is seen, not with what is."""
+"""Many satellites, many targets: work depends on what is visible, not on what exists."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def job(api: httpx.Client) -> Json:
 
 @pytest.fixture(scope="module")
 def crowded_job(api: httpx.Client) -> Json:
-    """One whose satellites leave most targets out."""
+    """A job whose satellites leave most targets out."""
     return planned(api, large_mission(api, num_satellites=2, num_days=1))
 
 
@@ -97,7 +97,7 @@ def test_a_click_takes_an_action_of_the_row_that_it_is_on(
             *(collect["start"], timeline["horizon"]["start"], timeline["horizon"]["end"]),
         )
         x, y = 120 + share * (canvas.size["width"] - 132), axis + (row + 0.2) * row_height
-        # As high as a screen is: the row must be in sight.
+        # The chart is as high as a screen: the row must be in view.
         browser.run(
             "arguments[0].scrollIntoView({block: arguments[1]})",
             canvas,
@@ -144,7 +144,7 @@ def test_nothing_large_is_asked_for_twice_and_outcomes_come_by_the_page(
     assert second[-1]["target_id"] in browser.text(f"{group} tbody tr:last-child")
     calls = Counter(urlsplit(url).path for url in browser.requests())
     assert calls[f"{path}/targets"] == 1
-    # What is selected far away is turned to, and told at length for one more call.
+    # A target selected on a distant page is scrolled to and explained with one more call.
     browser.click(f"{TARGETS} > summary")
     last = api.get(f"{path}/targets?reason={code}&limit=500").json()["items"][-1]
     browser.find("#target-find").send_keys(last["target_id"])

@@ -1,4 +1,4 @@
-"""A shift: the wall, taking over, a lost pass, a replan, its changes, approval, paper."""
+"""A shift: the wall, hand-over, a lost pass, a replan, its changes, approval, print."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def watch_the_wall(browser: Browser, api: httpx.Client, plan_id: str) -> None:
 def test_the_wall_outlasts_a_service_that_does_not_answer(browser: Browser, job: Json) -> None:
     browser.open("/wall")
     browser.wait(lambda: browser.text("#wall-status") or browser.text("#wall-passes"), "no wall")
-    # The page itself stays; what it asks for is lost as when the service is down.
+    # The page itself stays; its requests fail as when the service is down.
     browser.run(
         """
         window.realFetch = window.fetch;
@@ -205,7 +205,7 @@ def test_priorities_of_targets_are_changed(browser: Browser, api: httpx.Client) 
     browser.wait(lambda: browser.driver.find_elements("css selector", option), "no catalogue")
     browser.find(option).click()
     browser.wait(lambda: browser.text("#count") == "150 of 150 targets", "not its targets")
-    # Only a page of them is in the document: what was typed outlasts the table's turns.
+    # Only one page of them is in the document: typed text survives changing pages.
     for name, priority in (("Place 7 (", "12.5"), ("Place 149", "3")):
         browser.find("#find").clear()
         browser.find("#find").send_keys(name)

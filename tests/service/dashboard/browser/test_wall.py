@@ -1,4 +1,4 @@
-"""The wall over a restart of the service: real processes on one database and one port."""
+"""The wall during a restart of the service: real processes on one database and one port."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def client(url: str) -> httpx.Client:
 
 
 def free_port() -> str:
-    """Return a port that no connection of another program is given while the service is down."""
+    """Return a port that no other program's connection is given while the service is down."""
     for port in range(20_000, 32_000):
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(("127.0.0.1", port))
@@ -67,7 +67,7 @@ def test_the_wall_comes_back_by_itself_when_the_service_does(
             wall.wait(lambda: wall.run(MAP_SHARE) > LEAST_MAP_SHARE, f"much is empty at {size}")
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     wall.wait(lambda: "No answer since" in wall.text("#wall-status"), "it does not tell")
-    # What it knows it goes on telling.
+    # It keeps showing what it knows.
     before = wall.text("#wall-passes")
     wall.wait(lambda: wall.text("#wall-passes") != before, "the countdown stands still")
     assert "%" in wall.text("#wall-satellites")
@@ -85,6 +85,6 @@ def test_the_wall_comes_back_by_itself_when_the_service_does(
         wall.wait(lambda: "changed after" in wall.text("#wall-changes"), "nothing new is shown")
         assert "OS" in wall.text("#wall-passes")
         assert wall.run("return window.nobodyTouchedIt") is True
-    # Of a service that is gone, or has no worker yet, it may complain.
+    # It may complain about a service that is gone or has no worker yet.
     expected = ("ERR_CONNECTION_REFUSED", "/health/ready")
     assert [one for one in wall.complaints() if not any(e in one for e in expected)] == []

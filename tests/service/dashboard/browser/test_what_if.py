@@ -1,4 +1,4 @@
-"""What the page of a job says would let a target in, and what comes of trying it."""
+"""A job page's suggestions of what would let a target in, and the result of trying them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SELECT = """
 
 @pytest.fixture(scope="module")
 def job(api: httpx.Client) -> Json:
-    """A plan of a satellite that looks down and hardly to the sides: some targets are unseen."""
+    """A plan of a satellite with a narrow off-nadir limit: some targets are never visible."""
     eye = post(api, "/v1/satellites", satellite(sensor={"off_nadir_max_deg": 15.0}))
     rows = "".join(f"t{i},{lat},{2 * i}\n" for i, lat in enumerate(range(-60, 60, 2)))
     catalog = api.post(
@@ -45,7 +45,7 @@ def targets(api: httpx.Client, job: Json) -> list[Json]:
 
 
 def tried(browser: Browser, button: str) -> str:
-    """Press a button of the selection's, and try it; return what its plan is called, as a job."""
+    """Press one of the selection's buttons and run it; return the new job's name."""
     browser.click(button)
     browser.click("#try")
     browser.wait(lambda: browser.text(".what-if-outcome"), "no outcome")

@@ -1,4 +1,4 @@
-"""The API as a process that is started again whenever it ends, and a client that does not mind."""
+"""The API as a process that is restarted whenever it ends, and a client that copes with that."""
 
 from __future__ import annotations
 
@@ -53,16 +53,16 @@ class Api:
         return None if self._process is None else self._process.pid
 
     def kill(self) -> None:
-        """SIGKILL; the process is started again."""
+        """Send SIGKILL; the process is started again."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()
 
     def post_job(self, body: dict[str, Any]) -> str:
-        """Send a job until it is known to have been taken, and return its id.
+        """Send a job until it is known to have been accepted, and return its id.
 
-        An answer that did not come says nothing: the job is looked for by its label before it
-        is sent again.
+        A missing answer proves nothing: the job is searched for by its label before it is sent
+        again.
         """
         while True:
             known = self.answered("GET", "/v1/jobs", params={"label": body["label"]})
@@ -74,10 +74,10 @@ class Api:
                 return str(answer.json()["id"])
 
     def cancel(self, job_id: str) -> None:
-        """Cancel a job, however often it takes."""
+        """Cancel a job, with as many attempts as it takes."""
         answer = self.answered("POST", f"/v1/jobs/{job_id}/cancel")
         if answer.status_code != 202:
-            # The answer to an earlier try was lost, but not what it did.
+            # The answer to an earlier attempt was lost, but it took effect.
             job = self.answered("GET", f"/v1/jobs/{job_id}").json()
             assert job["state"] in ("cancelling", "cancelled"), job
 

@@ -1,4 +1,4 @@
-"""Controllers who replan a day and publish what they got, through every outage."""
+"""Controllers who replan a day and publish the result, through every outage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.missions import Document
 from tests.service.jobs.chaos.api import Api
 
 MOMENTS: Final = ("asked", "running", "drafted", "approved")
-"""Between a replan and its publication: when something may die."""
+"""Moments between a replan and its publication at which something may die."""
 FREEZE: Final = timedelta(minutes=20)
 _PROMISED: Final = 2
 _URGENT_REWARD: Final = 20.0
@@ -28,9 +28,9 @@ class Known:
     Attributes
     ----------
     promised
-        All targets that were promised in it or in a plan that it follows.
+        All targets that were promised in it or in its predecessors.
     parent, freeze_until
-        What it follows, and from when on it may differ from that.
+        Its predecessor, and from when on it may differ from that.
     """
 
     id: str
@@ -41,14 +41,14 @@ class Known:
 
 @dataclass(slots=True)
 class Controller:
-    """Asks for replans and publishes them; does not mind answers that are lost.
+    """Requests replans and publishes them; copes with lost answers.
 
     Attributes
     ----------
     die
         Called at each of ``MOMENTS``.
     refused
-        Why replans came to nothing, by the code of the job's error.
+        Reasons why replans failed, by the code of the job's error.
     """
 
     api: Api
@@ -70,7 +70,7 @@ class Controller:
         return plan
 
     def replan(self, plan: Known, now: datetime) -> Known | None:
-        """Ask for the plan that follows when something happens; None where it is refused."""
+        """Request the plan that follows an event; return None if it is refused."""
         freeze_until = now + FREEZE
         happened = self._happened(plan, now, freeze_until)
         job = self._post(f"/v1/plans/{plan.id}/replans", happened)
@@ -97,13 +97,13 @@ class Controller:
         self.die("approved")
 
     def publish(self, plan: Known, from_: datetime) -> bool:
-        """Publish a plan; return False where another one came first."""
+        """Publish a plan; return False if another one came first."""
         answer = self._move(plan, {"to": "published", "effective_from": instant_text(from_)})
         assert answer in ("published", "plan_overtaken"), answer
         return answer == "published"
 
     def actions(self, plan: Known) -> list[Document]:
-        """Return what a plan does, without what was reported of it."""
+        """Return a plan's actions, without the reports on them."""
         path = f"/v1/plans/{plan.id}/actions"
         page = self.api.answered("GET", path, params={"limit": 500}).json()
         assert page["next"] is None
@@ -157,7 +157,7 @@ class Controller:
         return [each["id"] for each in page["items"]]
 
     def _post(self, path: str, body: Document) -> Document:
-        # Sent again under its key, it gets the answer of the first time.
+        # Sent again with the same key, it gets the first answer.
         headers = {"Idempotency-Key": new_id()}
         answer = self.api.answered("POST", path, json=body, headers=headers)
         assert answer.is_success, answer.text
@@ -165,7 +165,7 @@ class Controller:
         return made
 
     def _move(self, plan: Known, body: dict[str, Any]) -> str:
-        """Return the state that a plan has come to, or the code of why it has not."""
+        """Return the state that a plan has reached, or the code of why not."""
         path = f"/v1/plans/{plan.id}/transitions"
         headers = {"Idempotency-Key": new_id()}
         answer = self.api.answered("POST", path, json=body, headers=headers)

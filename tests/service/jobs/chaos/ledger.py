@@ -1,4 +1,4 @@
-"""What became of every job, and whether that is what had been promised."""
+"""The outcome of every job, compared with what was promised."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.service.jobs.conftest import Jobs
 _ENDINGS = sa.table("ending", sa.column("job_id"))
 _STATES = ", ".join(f"'{state}'" for state in FINAL)
 
-# Each time that a job's state becomes final, by whatever process and way.
+# One entry each time a job's state becomes final, by whatever process and way.
 _SQLITE = (
     "CREATE TABLE ending (job_id TEXT)",
     f"CREATE TRIGGER note_ending AFTER UPDATE OF state ON job WHEN new.state IN ({_STATES})"
@@ -33,7 +33,7 @@ _POSTGRESQL = (
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """A job at the end, with the run that its answer came from (None without an answer)."""
+    """A job at the end, with the run that produced its answer (None without an answer)."""
 
     job: JobRow
     endings: int
@@ -49,7 +49,7 @@ def open_ledger(jobs: Jobs) -> None:
 
 
 def num_unfinished(jobs: Jobs) -> int:
-    """Return how many jobs have yet to end."""
+    """Return how many jobs have not ended yet."""
     unfinished = sa.select(sa.func.count(JobRow.id)).where(JobRow.state.not_in(FINAL))
     with jobs.database.reading() as session:
         return session.execute(unfinished).scalar_one()
@@ -69,7 +69,7 @@ def read_ledger(jobs: Jobs) -> list[Ended]:
 
 
 def check(jobs: Jobs, ended: list[Ended], promised: Mapping[str, str]) -> None:
-    """Compare the jobs with what was promised: the state that each must end in, by its id."""
+    """Compare the jobs with what was promised: each job's final state, by its id."""
     found = {entry.job.id for entry in ended}
     assert found == set(promised), "jobs were lost, or came from nowhere"
     for entry in ended:
@@ -85,7 +85,7 @@ def check(jobs: Jobs, ended: list[Ended], promised: Mapping[str, str]) -> None:
 
 
 def check_shares(ended: list[Ended], giant: str) -> None:
-    """No tenant waits for the giant: each has had an answer when half of the giant's are there."""
+    """Check that each tenant has an answer by the time half of the giant's are there."""
     order = [entry.job.tenant for entry in ended]
     of_giant = [place for place, tenant in enumerate(order) if tenant == giant]
     served = set(order[: of_giant[len(of_giant) // 2]])

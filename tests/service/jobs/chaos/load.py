@@ -22,7 +22,7 @@ _NEVER_ENDING_S = 3000.0
 
 
 class Load:
-    """Submits jobs through every outage, and knows what must become of each.
+    """Submits jobs through every outage, and knows each one's expected outcome.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Load:
         self._random = random.Random(seed)
 
     def submit(self, number: int) -> None:
-        """Submit so many jobs: first half of them by one tenant, then the others by turns."""
+        """Submit this number of jobs: half by one tenant first, then the others in turn."""
         half = number // 2
         for _ in range(half):
             self._put(GIANT)
@@ -50,7 +50,7 @@ class Load:
             by_turns[place % len(by_turns)]()
 
     def _put(self, tenant: str) -> None:
-        """Submit a quick job, a short one or one that still runs when it has been taken over."""
+        """Submit a job: a quick one, a short one, or one that still runs when taken over."""
         long_s = _LEASES_OF_A_LONG_JOB * self._jobs.settings.lease_s
         time_s = self._random.choice((self._random.uniform(*_SHORT_S), long_s))
         solver = self._random.choice(("answer", "search"))
@@ -61,7 +61,7 @@ class Load:
                 self._jobs.submit(solver, job_id=job_id, tenant=tenant, limits=limits)
                 break
             except IntegrityError:
-                break  # an earlier try had been kept, though it seemed to fail
+                break  # an earlier attempt was stored, though it seemed to fail
             except SQLAlchemyError as error:
                 if why_unavailable(error) is None:
                     raise

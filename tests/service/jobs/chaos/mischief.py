@@ -24,11 +24,11 @@ from tests.service.jobs.conftest import SERVER_URL, Jobs
 from tests.service.jobs.unwritable import no_room_for, read_only_server
 
 SERVER_CONTROL = shlex.split(os.environ.get("SLEWLINE_TEST_SERVER_CONTROL", ""))
-"""The ``pg_ctl`` of the server that SERVER_URL names."""
+"""The ``pg_ctl`` command of the server that SERVER_URL names."""
 
 
 class HasWorkers(Protocol):
-    """Who runs the workers."""
+    """The owner of the workers."""
 
     def pids(self) -> list[int]:
         """Return their process ids."""
@@ -36,12 +36,12 @@ class HasWorkers(Protocol):
 
 
 class Mischief:
-    """Does harm to one running service; all of it has passed when ``run`` returns.
+    """Causes faults in one running service; all of them are over when ``run`` returns.
 
     Attributes
     ----------
     done
-        How often each fault has been done.
+        How often each fault has been caused.
     """
 
     def __init__(self, jobs: Jobs, api: Api, workers: HasWorkers, seed: int):
@@ -54,7 +54,7 @@ class Mischief:
         self._frozen: dict[int, threading.Timer] = {}
 
     def run(self, rounds: int, pause_s: float) -> None:
-        """Do every fault so many times, in random order."""
+        """Cause every fault this number of times, in random order."""
         if SERVER_URL is None:
             of_database = [self.hold_lock, self.fill_disk]
         else:
@@ -69,53 +69,53 @@ class Mischief:
             timer.join()
 
     def kill_worker(self) -> None:
-        """SIGKILL, whether at work or frozen."""
+        """Send SIGKILL to a worker, whether busy or frozen."""
         os.kill(self._some_worker(), signal.SIGKILL)
 
     def kill_workers(self) -> None:
-        """SIGKILL all of them at once."""
+        """Send SIGKILL to all of them at once."""
         for pid in self._workers.pids():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
 
     def freeze_worker(self) -> None:
-        """SIGSTOP for longer than a lease, while other faults go on."""
+        """Send SIGSTOP for longer than a lease, while other faults go on."""
         pid = self._busy_worker()
         os.kill(pid, signal.SIGSTOP)
-        # It may wake while the next owner is still at work, or when all is over.
+        # It may wake while the next owner is still at work, or when everything is over.
         frozen_s = self._jobs.settings.lease_s * self._random.uniform(1.5, 3.0)
         timer = threading.Timer(frozen_s, _wake, [pid])
         timer.start()
         self._frozen[pid] = timer
 
     def kill_api(self) -> None:
-        """SIGKILL, in the middle of whatever it answers."""
+        """Send SIGKILL in the middle of any answer."""
         self._api.kill()
 
     def hold_lock(self) -> None:
-        """Keep everybody from writing to a SQLite file."""
+        """Lock a SQLite file against all writers."""
         with closing(sqlite3.connect(self._jobs.folder / "jobs.db", timeout=60.0)) as connection:
             connection.execute("BEGIN IMMEDIATE")
             time.sleep(self._too_long_s)
 
     def fill_disk(self) -> None:
-        """Let all writes to the files fail."""
+        """Make all writes to the files fail."""
         with self._no_room():
             time.sleep(self._too_long_s)
 
     def crash_server(self) -> None:
-        """SIGKILL PostgreSQL and start it again; it recovers from its log."""
+        """Send SIGKILL to PostgreSQL and start it again; it recovers from its log."""
         _control("kill", "KILL", str(_server_pid()))
         _start_server()
 
     def stop_server(self) -> None:
-        """End PostgreSQL at once, and leave it so for longer than a lease."""
+        """Stop PostgreSQL at once, for longer than a lease."""
         _control("stop", "-m", "immediate")
         time.sleep(self._too_long_s)
         _start_server()
 
     def forbid_writing(self) -> None:
-        """Let PostgreSQL be read-only for longer than a lease."""
+        """Make PostgreSQL read-only for longer than a lease."""
         assert SERVER_URL is not None
         with read_only_server(SERVER_URL):
             time.sleep(self._too_long_s)
@@ -126,7 +126,7 @@ class Mischief:
         return self._random.choice(pids)
 
     def _busy_worker(self) -> int:
-        """Return a worker whose solver is at work, or any where none is."""
+        """Return a worker whose solver is running, or any worker if there is none."""
         for start in reversed(self._jobs.starts()):
             try:
                 _fork_server, worker, *_ = psutil.Process(int(start.split()[-1])).parents()
@@ -138,8 +138,8 @@ class Mischief:
 
     @contextlib.contextmanager
     def _no_room(self) -> Iterator[None]:
-        # One that has not enrolled is still starting the server that its solvers will be forks
-        # of, and would leave them the limit.
+        # A worker that has not enrolled is still starting the server that forks its solvers, which
+        # would inherit the limit.
         enrolled = {int(name.split("-")[-2]) for name in self._jobs.workers()}
         pids = [pid for pid in self._workers.pids() if pid in enrolled]
         api = self._api.pid()
@@ -151,7 +151,7 @@ class Mischief:
 
 @contextlib.contextmanager
 def _unless_it_ends(pid: int) -> Iterator[None]:
-    """Leave a process no room; it may have ended before, or end meanwhile."""
+    """Leave a process no disk space; it may have ended before, or may end meanwhile."""
     with contextlib.suppress(ProcessLookupError), ExitStack() as stack:
         with contextlib.suppress(ProcessLookupError):
             stack.enter_context(no_room_for(pid))
@@ -179,7 +179,7 @@ def _control(*arguments: str) -> None:
 
 
 def _start_server() -> None:
-    """Start the server, as soon as the processes of the one before are gone."""
+    """Start the server, as soon as the processes of the previous one are gone."""
     _until_it_works(lambda: _control("start"))
 
 

@@ -1,7 +1,7 @@
-"""Whatever dies, freezes or is away: every job ends once, with the answer of its last run.
+"""Whatever dies, freezes or is unreachable: every job ends once, with its last run's answer.
 
 Not among the ordinary tests: ``make chaos`` runs it on SQLite and PostgreSQL with
-SLEWLINE_TEST_CHAOS_JOBS jobs, and the fewer of its default are part of ``.ci/run``.
+SLEWLINE_TEST_CHAOS_JOBS jobs; ``.ci/run`` includes it with the smaller default number.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PATIENCE_S = 120.0 + 3.0 * NUM_JOBS
 
 def test_nothing_is_lost(jobs: Jobs, capsys: pytest.CaptureFixture[str]) -> None:
     settings = jobs.settings.model_copy(
-        # A job may well lose its worker many times here, and is not to blame.
+        # A job may lose its worker many times here, and is not to blame.
         update={"workers": 3, "max_running_per_tenant": 2, "max_attempts": 1000}
     )
     ledger.open_ledger(jobs)
@@ -46,7 +46,7 @@ def test_nothing_is_lost(jobs: Jobs, capsys: pytest.CaptureFixture[str]) -> None
         try:
             jobs.until(lambda: len(jobs.workers()) == settings.workers)
             harm.start()
-            # The later ones come while the first faults are done.
+            # The later jobs arrive while the first faults occur.
             load.submit(NUM_JOBS - NUM_JOBS // 2)
             harm.join()
             wait_for_the_end(jobs)
@@ -65,7 +65,7 @@ def test_nothing_is_lost(jobs: Jobs, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def wait_for_the_end(jobs: Jobs) -> None:
-    """Wait until no job is left; the database may be recovering yet."""
+    """Wait until no job is left; the database may still be recovering."""
     deadline_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline_s:
         try:

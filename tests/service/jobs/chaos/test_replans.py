@@ -1,6 +1,6 @@
-"""Whatever dies between a replan and its publication: what is frozen stays, what is promised too.
+"""Whatever dies between a replan and its publication: frozen actions and promises are kept.
 
-Two controllers replan the same plan and publish at once. Run as ``test_nothing_is_lost`` is.
+Two controllers replan the same plan and publish at once. Run like ``test_nothing_is_lost``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Harm:
     Attributes
     ----------
     number
-        Of the round.
+        The current round.
     """
 
     def __init__(self, mischief: Mischief, api: Api):
@@ -46,7 +46,7 @@ class Harm:
         self._lock = threading.Lock()
 
     def die(self, who: int, moment: str) -> None:
-        """Do harm if the moment has come, another one in each round."""
+        """Kill if the moment has come, which is another one in each round."""
         if moment != MOMENTS[(self.number + 2 * who) % len(MOMENTS)]:
             return
         with self._lock:
@@ -92,7 +92,7 @@ def follow_the_day(
     document: Document = paper_mission(drawn_targets(NUM_TARGETS), horizon=HORIZON)
     chain = [controllers[0].begin(document)]
     drafts: list[Known] = []
-    # The database fails and processes freeze meanwhile, whatever is going on.
+    # Meanwhile the database fails and processes freeze at any time.
     faults = threading.Thread(target=mischief.run, args=(max(1, NUM_ROUNDS // 6), 5.0))
     faults.start()
     with ThreadPoolExecutor(len(controllers)) as pool:
@@ -115,7 +115,7 @@ def follow_the_day(
 
 
 def check_states(controller: Controller, chain: list[Known], drafts: list[Known]) -> None:
-    """One plan is in force, those before it were superseded, the others wait; there are no more."""
+    """Check that one plan is in force, earlier ones are superseded and the others are drafts."""
     expected = dict.fromkeys((plan.id for plan in drafts), "approved")
     expected |= dict.fromkeys((plan.id for plan in chain), "superseded")
     expected[chain[-1].id] = "published"
@@ -123,7 +123,7 @@ def check_states(controller: Controller, chain: list[Known], drafts: list[Known]
 
 
 def check_plan(controller: Controller, plan: Known) -> None:
-    """Compare a plan with the one it follows, and with what was promised in all before it."""
+    """Compare a plan with its predecessor, and with all earlier promises."""
     actions = controller.actions(plan)
     assert plan.promised <= {action["target_id"] for action in actions}, "a promise was bumped"
     if plan.parent is None or plan.freeze_until is None:
