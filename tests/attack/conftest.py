@@ -1,4 +1,4 @@
-"""What attacks are aimed at: servers with owners and keys, on SQLite or the named PostgreSQL."""
+"""The attacks' targets: servers with owners and keys, on SQLite or the given PostgreSQL."""
 
 from __future__ import annotations
 
@@ -37,22 +37,22 @@ __all__ = [
     "workers",
 ]
 
-# A server's disk and locks are its own.
+# A server has its own disk and locks.
 collect_ignore = ["test_full_disk.py"] if SERVER_URL else []
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """An API that asks for keys, and all that it starts."""
+    """An API that requires keys, and all the processes it starts."""
 
     door: Door
     process: prepared.Program
 
     @property
     def heavy(self) -> psutil.Process:
-        """The process that does what is heavy."""
+        """The process for heavy requests."""
         (fork_server,) = psutil.Process(self.process.pid).children()
-        # It begins beside the API, which may be ready before it.
+        # It starts alongside the API, which may be ready first.
         wait_until(lambda: len(fork_server.children()) == 1)
         (process,) = fork_server.children()
         return process
@@ -85,5 +85,5 @@ def running_program(jobs: Jobs, num_files: int = 0, **settings: object) -> Itera
 
 @pytest.fixture
 def program(jobs: Jobs) -> StartProgram:
-    """Return what runs the program on the database of jobs, with some settings changed."""
+    """Return a function that runs the program on the database of jobs with changed settings."""
     return partial(running_program, jobs)

@@ -1,4 +1,4 @@
-"""Bodies that take long to read, or become very large when they are."""
+"""Bodies that take long to parse, or become very large when parsed."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_while_a_large_body_is_read_everybody_else_is_served(program: StartProgr
             path = run.door.client.base_url.join("/v1/ground-stations")
             return httpx.post(path, content=body, headers=key | JSON, timeout=300, verify=NO_TLS)
 
-        # As if it took for ever to parse it.
+        # As if parsing it took for ever.
         run.heavy.send_signal(signal.SIGSTOP)
         with ThreadPoolExecutor(1) as pool:
             answer = pool.submit(send)

@@ -1,4 +1,4 @@
-"""What is heavy is done in a process of its own, and holds up nobody."""
+"""Heavy work runs in a process of its own, and delays no other request."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ HORIZON = {"start": "2026-03-01T00:00:00Z", "end": "2026-03-02T00:00:00Z"}
 
 @pytest.fixture(scope="module")
 def plain(template_url: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
-    """A program with the settings of everybody, for all tests that leave it as it was."""
+    """A program with default settings, for all tests that leave it as it was."""
     with (
         stored_jobs(template_url, tmp_path_factory.mktemp("plain")) as jobs,
         running_program(jobs) as run,
@@ -50,7 +50,7 @@ def post(program: Program, path: str, body: object, key: dict[str, str]) -> http
 
 
 def scenario(program: Program, key: dict[str, str], num_targets: int, **fields: Any) -> str:
-    """Store a question about so many targets and return its id."""
+    """Store a scenario with this number of targets and return its id."""
     catalog = {"name": "Many", "targets": targets(num_targets)}
     body = {
         "horizon": HORIZON,
@@ -86,7 +86,7 @@ def test_what_is_passed_on_is_answered_as_if_it_were_not(plain: Program) -> None
     refused = client.get(f"/v1/scenarios/{small}/opportunities?limit=0", headers=key)
     assert_problem(refused, 422, "value_out_of_range")
     assert_problem(client.get(f"/v1/scenarios/{small}"), 401, "authentication_required")
-    # Whoever makes a key up to be somebody is nobody: the header is ours alone.
+    # A caller cannot forge an identity: only the service itself may set this header.
     admin = {"x-slewline-caller": json.dumps({"owner": "x", "scope": "admin"})}
     assert client.get(f"/v1/scenarios/{small}", headers=admin).status_code == 401
     assert client.get("/v1/audit-events", headers=key | admin).status_code == 403
@@ -154,7 +154,7 @@ def test_one_who_asks_for_much_at_once_holds_up_nobody(plain: Program) -> None:
 
     with ThreadPoolExecutor(40) as pool:
         answers = [pool.submit(ask, number) for number in range(40)]
-        assert one_was_refused.wait(300)  # as many wait as may, and one more has asked
+        assert one_was_refused.wait(300)  # as many wait as may, and one more was refused
         assert plain.door.client.get("/v1/me", headers=other).status_code == 200
         assert not all(one.done() for one in answers), "nobody waits for the answer any more"
         assert "too_busy" in {one.result() for one in answers}
@@ -165,7 +165,7 @@ def test_a_process_that_holds_too_much_is_ended_and_the_api_goes_on(program: Sta
         key = run.door.key("submit")
         first, api = run.heavy.pid, psutil.Process(run.process.pid)
         before_mb = api.memory_info().rss / 1e6
-        # A million numbers in lists, each of them an object of its own.
+        # Millions of numbers in lists, each of them a separate object.
         body = {"name": "Much", "targets": [[0.5 + i for i in range(9)] for _ in range(300_000)]}
         answer = post(run, "/v1/target-catalogs", body, key)
         assert_problem(answer, 503, "too_heavy")

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler is on th
 
 
 class Clock:
-    """A clock that is set while processes read it. Time since their start goes on evenly."""
+    """A clock that is set while processes read it. Their monotonic time runs on evenly."""
 
     def __init__(self, folder: Path):
         self._file = folder / "clock"
@@ -40,11 +40,11 @@ class Clock:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What a process reads this clock by."""
+        """The environment in which a process reads this clock."""
         return {"LD_PRELOAD": str(self._library), "SLEWLINE_TEST_CLOCK": str(self._file)}
 
     def jump(self, seconds: int) -> None:
-        """Show so many seconds more than it is."""
+        """Show this many seconds more than the true time."""
         new = self._file.with_suffix(".new")
         new.write_text(f"{seconds:+d}")
         new.chmod(0o644)
@@ -52,7 +52,7 @@ class Clock:
 
 
 def _beats(jobs: Jobs) -> set[tuple[str, object]]:
-    """Return when each worker was seen last."""
+    """Return when each worker was last seen."""
     with jobs.database.reading() as session:
         return {(row.id, row.seen_at) for row in session.scalars(sa.select(WorkerRow))}
 
@@ -63,7 +63,7 @@ def _all_seen_since(jobs: Jobs, before: set[tuple[str, object]]) -> bool:
 
 @contextmanager
 def _server_under(clock: Clock) -> Iterator[None]:
-    """Have the server, where there is one, read this clock."""
+    """Make the server, if there is one, read this clock."""
     if not SERVER_CONTROL:
         yield
         return
@@ -75,10 +75,10 @@ def _server_under(clock: Clock) -> Iterator[None]:
 
 
 def _restart(environment: dict[str, str]) -> None:
-    # The server alone is to read the clock, not the shell that becomes another user before.
+    # Only the server must read the clock, not the shell that first becomes another user.
     become, control = SERVER_CONTROL[:-7], SERVER_CONTROL[-7:]
     assert control[1] == "-D"
-    # Where it did not come up before, there is nothing to stop.
+    # If it did not start before, there is nothing to stop.
     subprocess.run([*SERVER_CONTROL, "-m", "fast", "stop"], cwd="/", check=False)
     names = [f"{name}={value}" for name, value in environment.items()]
     subprocess.run([*become, "env", *names, *control, "start"], cwd="/", check=True)
@@ -86,14 +86,14 @@ def _restart(environment: dict[str, str]) -> None:
 
 @pytest.fixture
 def clock() -> Iterator[Clock]:
-    # A server reads it as another user, who may not look into the folders of tests.
+    # The server reads it as another user, who may not open the tests' folders.
     with tempfile.TemporaryDirectory() as folder:
         Path(folder).chmod(0o755)
         yield Clock(Path(folder))
 
 
 def let_clocks_jump(jobs: Jobs, clock: Clock) -> None:
-    """Set the clock forth and back under jobs that run, and see them end, each once."""
+    """Set the clock forward and back while jobs run, and check that each ends once."""
     ids = [jobs.submit("search") for _ in range(NUM_JOBS)]
     jobs.until(lambda: len(jobs.starts()) >= 2)
     for jump_s in JUMPS_S:
@@ -115,7 +115,7 @@ def test_a_clock_that_jumps_under_one_of_two_workers(
     workers.start(clock.environment)
     let_clocks_jump(jobs, clock)
     if SERVER_URL:
-        # Leases are judged by the server's clock alone.
+        # Only the server's clock decides about leases.
         assert len(jobs.starts()) == NUM_JOBS
 
 

@@ -1,4 +1,4 @@
-"""More connections than a process may have, and such as never say what they want."""
+"""More connections than a process may have, and some that never send a request."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.service.jobs.conftest import stored_jobs
 NUM = 1050
 NUM_FILES = 1024
 
-# Where connections must not reach the time limits of the idle, however slow the machine is:
+# For tests in which connections must not reach the idle time limit, however slow the machine:
 # files for 64 of them.
 FEW_FILES = 320
 FEW = 88
@@ -31,7 +31,7 @@ FEW = 88
 
 @contextmanager
 def connected(client: httpx.Client, number: int, *texts: str) -> Iterator[list[socket.socket]]:
-    """Open connections that send a text each, these in turn."""
+    """Open connections that each send one of the texts, in turn."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft < 2 * number:
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(2 * number, hard), hard))
@@ -56,7 +56,7 @@ def status_of(connection: socket.socket) -> int:
 
 
 def is_closed(connection: socket.socket) -> bool:
-    """Wait until the other side closes."""
+    """Return True once the other side has closed."""
     try:
         while connection.recv(65_536):
             pass
@@ -66,7 +66,7 @@ def is_closed(connection: socket.socket) -> bool:
 
 
 def assert_served(run: Program, key: dict[str, str]) -> None:
-    """Others are served, each over a connection of its own."""
+    """Assert that others are served, each over a connection of its own."""
     for _ in range(10):
         for path in ("/health/live", "/v1/me"):
             address = run.door.client.base_url.join(path)
@@ -76,7 +76,7 @@ def assert_served(run: Program, key: dict[str, str]) -> None:
 
 @pytest.fixture(scope="module")
 def crowded(template_url: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
-    """A program of few files, for all tests that leave it as it was."""
+    """A program with few file descriptors, for all tests that leave it as it was."""
     with (
         stored_jobs(template_url, tmp_path_factory.mktemp("crowded")) as jobs,
         running_program(jobs, NUM_FILES) as run,
@@ -92,7 +92,7 @@ def test_streams_of_one_owner_leave_room_for_others(crowded: Program) -> None:
         statuses = Counter(map(status_of, streams))
         assert statuses == {200: MOST_OF_AN_OWNER, 503: NUM - MOST_OF_AN_OWNER}
         assert_served(crowded, other)
-    # Those that have gone leave their places to others.
+    # Closed connections make room for others.
     with connected(door.client, 1, head("GET", path, **greedy)) as (again,):
         assert status_of(again) == 200
 
@@ -135,7 +135,7 @@ def test_half_sent_bodies_leave_room_for_others(crowded: Program) -> None:
     sent = {"Content_Type": "application/json", "Content_Length": "1000"}
     with connected(client, NUM, head("POST", "/v1/jobs", **greedy, **sent) + "{"):
         assert_served(crowded, other)
-    # Nobody reads on after a refusal, however long somebody goes on sending.
+    # After a refusal nothing more is read, however long the client keeps sending.
     with connected(client, 1, head("POST", "/v1/jobs", **sent)) as (refused,):
         assert status_of(refused) == 401
         refused.settimeout(1.0)

@@ -1,4 +1,4 @@
-"""Names that spreadsheets would run: guarded in every table, and read back as they were."""
+"""Names that spreadsheets would execute: escaped in every table, and read back unchanged."""
 
 from __future__ import annotations
 

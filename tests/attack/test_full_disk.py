@@ -1,4 +1,4 @@
-"""A database without room, or locked by somebody else, during every kind of write (SQLite)."""
+"""A database without room, or locked by another process, during every kind of write (SQLite)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Breaks = Callable[[sa.Engine], AbstractContextManager[None]]
 
 @contextmanager
 def locked(engine: sa.Engine) -> Iterator[None]:
-    """Hold the lock that writers take, and let others wait for it a moment in place of 30 s."""
+    """Hold the writers' lock, and let others wait for it a moment instead of 30 s."""
     with sqlite_pragma(engine, "busy_timeout = 50", "busy_timeout = 30000"):
         other = sqlite3.connect(str(engine.url.database))
         try:
@@ -37,7 +37,7 @@ def locked(engine: sa.Engine) -> Iterator[None]:
 
 @contextmanager
 def full(engine: sa.Engine) -> Iterator[None]:
-    """Let the file grow no more, and leave no free page in it."""
+    """Stop the file from growing, and leave no free page in it."""
     engine.dispose()
     with closing(sqlite3.connect(str(engine.url.database))) as connection:
         connection.execute("VACUUM")
@@ -124,7 +124,7 @@ def test_every_write_is_done_wholly_or_503(jobs: Jobs, broken: Breaks) -> None:
                     assert_problem(answer, 503, "database_unavailable")
                     refused.append(name)
                 else:
-                    # A write that needs no new page has its room.
+                    # A write that needs no new page still fits.
                     assert broken is full, (name, answer.text)
                     assert answer.is_success, (name, answer.text)
             assert client.get("/v1/jobs").status_code == 200

@@ -13,7 +13,7 @@ from tests.service.test_plan_job import run
 
 
 def planned(solver: str = "rule", **resources: Any) -> Document:
-    """Return the timeline of a mission that begins like this."""
+    """Return the timeline of a mission that begins with these resources."""
     file = paper_mission(drawn_targets(20))
     file["satellites"][0]["resources"] = {"preset": "paper"} | resources
     timeline: Document = json.loads(timeline_text(run(file, solver).chunks))

@@ -1,4 +1,4 @@
-"""Lists that everybody reads, filled with what only few would look at."""
+"""Lists that everybody reads, filled with data that hardly anybody needs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NUM_PINS = 3000
 
 @pytest.fixture
 def question(client: httpx.Client) -> dict[str, Any]:
-    """A question about many targets whose ids are as long as they may be."""
+    """Return a scenario with many targets whose ids have the maximum length."""
     ids = [f"{'x' * 190}{number:05d}" for number in range(NUM_PINS)]
     lines = [f"{own_id},{1 + i * 0.001},8.0" for i, own_id in enumerate(ids)]
     text = "\n".join(["id,lat_deg,lon_deg", *lines])

@@ -1,4 +1,4 @@
-"""What belongs to one owner, and what another one sees of it."""
+"""One owner's data, and how much of it another owner sees."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_scenario_that_came_with_a_job_is_its_owners(door: Door) -> None:
     ):
         assert_problem(door.client.post(path, json=asked, headers=other), 422, "unknown_scenario")
         assert door.client.post(path, json=asked, headers=mine).status_code == 202
-    # Who asks the same is told the same, and sees no more than that.
+    # An equal scenario has the same id for both owners, and shows nothing more than that.
     assert post_job(door, other, file)["scenario"]["id"] == scenario
     assert scenario in seen(door, other) & seen(door, mine)
     assert scenario not in seen(door, door.key("read", "d"))

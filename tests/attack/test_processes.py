@@ -1,4 +1,4 @@
-"""Processes that are taken away, and what becomes of the jobs they ran."""
+"""Processes that are killed, and the fate of the jobs they ran."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tests.service.jobs.conftest import Jobs, Workers
 
 
 def test_a_job_outlives_the_process_it_was_forked_from(jobs: Jobs, workers: Workers) -> None:
-    # No lease may run out by itself: the one run that is lost shall be this one.
+    # No lease may expire by itself: the one lost run must be this one.
     workers.jobs = replace(jobs, settings=jobs.settings.model_copy(update={"lease_s": 120.0}))
     workers.start()
     params = {"log": str(jobs.folder / "starts.log"), "survives": 2}

@@ -1,4 +1,4 @@
-"""One owner that sends more jobs than anybody can run."""
+"""One owner that submits more jobs than can be run."""
 
 from __future__ import annotations
 
@@ -30,4 +30,4 @@ def test_comparisons_of_one_owner_leave_room_for_the_others(make_door: MakeDoor)
             assert_problem(again, 503, "queue_full")
         for _ in range(3):
             door.submit(other)
-        assert_problem(compare(door, other, 1), 503, "queue_full")  # nobody has room now
+        assert_problem(compare(door, other, 1), 503, "queue_full")  # now it is full for everybody

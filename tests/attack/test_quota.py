@@ -29,7 +29,7 @@ def test_rows_of_files_are_counted_for_their_owner(make_door: MakeDoor) -> None:
         assert send(greedy) == 201
         refused = door.client.post("/v1/target-catalogs", json=body, headers=greedy)
         assert_problem(refused, 403, "quota_exceeded")
-        assert used(door, "greedy")[0] == 3  # what was refused is not stored
+        assert used(door, "greedy")[0] == 3  # refused requests are not stored
         assert len(door.client.get("/v1/target-catalogs", headers=greedy).json()["items"]) == 1
         assert send(other) == 201
 

@@ -1,4 +1,4 @@
-"""Pages of other sites, in the browser of somebody who may call the service."""
+"""Pages of other sites, in the browser of a user who may call the service."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EVIL = "https://evil.example"
 
 
 def import_by_form(door: Door, **headers: str) -> httpx.Response:
-    """Post elements as a page can without asking first: as plain text."""
+    """Post elements as a page can without a preflight request: as plain text."""
     content = "\n".join(tle())
     return door.client.post(
         "/v1/satellites/import",
@@ -44,7 +44,7 @@ def test_a_page_of_a_foreign_origin_orders_nothing(make_door: MakeDoor) -> None:
         path = "/stapi/products/paper/orders"
         answer = door.client.post(path, json={}, headers={"Origin": EVIL})
         assert_problem(answer, 403, "foreign_origin")
-        # A body that says nothing is all that is wrong with it otherwise.
+        # Without the foreign origin only the empty body is wrong.
         assert door.client.post(path, json={}).status_code == 422
 
 
@@ -60,7 +60,7 @@ def test_a_name_that_was_made_to_lead_here_is_not_served(make_door: MakeDoor, ho
         assert_problem(answer, 421, "misdirected_request")
         for good in ("localhost", "LOCALHOST:8000", "[::1]:8000", "127.0.0.1", "ops.example:443"):
             assert door.client.get("/v1/jobs", headers={"Host": good}).status_code == 200
-        # Whoever asks for health may call by any name: it tells nothing.
+        # Health may be requested under any host name: it reveals nothing.
         assert door.client.get("/health/live", headers={"Host": host}).status_code == 200
 
 

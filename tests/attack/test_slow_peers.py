@@ -1,4 +1,4 @@
-"""Receivers that answer without end, and addresses that callers make up."""
+"""Receivers whose answers never end, and addresses that callers make up."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ENDLESS = (
 
 @contextmanager
 def endless_receiver(beginning: bytes) -> Iterator[tuple[str, list[int]]]:
-    """Take connections and go on with what looks like an answer; yields how much each took."""
+    """Accept connections and send endless answers; yield the address and how much each one took."""
     sent: list[int] = []
     more = beginning if beginning.startswith(b"HTTP/1.1 100") else b"a" * 65536
 
@@ -76,12 +76,12 @@ def test_a_receiver_that_answers_without_end_is_read_for_seconds_only(
             )
             wait_until(lambda: post.receiver.of_path("/other"))
         assert len(sent) == 1
-        # What goes into the buffers of both ends, and not what it would have sent.
+        # What the buffers of both ends hold, not all that it would have sent.
         assert sent[0] < 50_000_000
 
 
 def refused_of(client: httpx.Client, number: int, *, trusted_last: str) -> int:
-    """Return how many calls were refused, each of which claims another address of its own."""
+    """Return how many calls were refused, each claiming a different address."""
     calls = (
         client.get(
             "/v1/me", headers={"X-Forwarded-For": f"10.0.{n % 250}.{n // 250}{trusted_last}"}
@@ -93,7 +93,7 @@ def refused_of(client: httpx.Client, number: int, *, trusted_last: str) -> int:
 
 @pytest.fixture(scope="module")
 def limited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], str]]:
-    """Return what says where a service is that takes the word of such proxies; one for each."""
+    """Return a function from trusted proxies to the address of a service that trusts them."""
     limits = {"rate_limit_per_s": "0.001", "rate_limit_burst": "5"}
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
 
@@ -110,10 +110,10 @@ def limited(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str]
 @pytest.mark.parametrize(
     ("trusted", "last", "is_limited"),
     [
-        ("", "", True),  # nobody's word is taken
-        ("192.0.2.1", "", True),  # another proxy's is
-        ("127.0.0.1", ", 198.51.100.7", True),  # the proxy adds whom it has seen
-        ("127.0.0.1", "", False),  # the proxy itself says so
+        ("", "", True),  # no proxy is trusted
+        ("192.0.2.1", "", True),  # another proxy is trusted
+        ("127.0.0.1", ", 198.51.100.7", True),  # the proxy appends the address it has seen
+        ("127.0.0.1", "", False),  # the proxy itself claims the addresses
     ],
 )
 def test_a_made_up_address_moves_no_rate_limit(

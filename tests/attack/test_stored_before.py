@@ -1,4 +1,4 @@
-"""Values that an earlier release took in, and this one would refuse: shown, not planned with."""
+"""Values that an earlier release accepted and this one refuses: shown, but not planned with."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def stored(client: httpx.Client, jobs: Jobs) -> dict[str, Any]:
 
 
 def test_lists_and_things_show_what_is_stored(client: httpx.Client, stored: dict[str, Any]) -> None:
-    # What is shown is beyond the ranges that are declared: no answer is held against them.
+    # The values exceed the declared ranges: no answer is checked against the schema.
     address = client.base_url
     with Client(str(address)) as reading:
         assert next(reading.satellites.list()).agility.settle_s == FAR

@@ -1,4 +1,4 @@
-"""Numbers beyond any float and texts that no export can carry: refused wherever they may stand."""
+"""Numbers beyond any float and texts that no export can hold: refused in every field."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ GOOD_TEXTS: Final = (
 
 
 def send(client: httpx.Client, path: str, body: object) -> httpx.Response:
-    """Post JSON with every character spelt as JSON can, halves of pairs as well."""
+    """Post JSON with every character beyond ASCII escaped, lone surrogates as well."""
     headers = {"Content-Type": "application/json"}
     return client.post(path, content=json.dumps(body), headers=headers)
 
 
 def bodies(text: Any, number: Any) -> list[tuple[str, Document]]:
-    """Return bodies whose texts, or numbers, are these wherever the schema is open or has one."""
+    """Return bodies with these texts or numbers wherever the schema is open or has one."""
     omm = PAPER_ORBIT | {"OBJECT_NAME": text or "A", "COMMENT": [{"any": text}], "X": number}
     file = paper_mission([target(id=text or "t")])
     return [
@@ -70,7 +70,7 @@ def bodies(text: Any, number: Any) -> list[tuple[str, Document]]:
 
 
 def one_by_one(body: Any, bad: object, good: object) -> Iterator[Any]:
-    """Yield the body for each place that holds a bad value, with good ones in the others."""
+    """Yield the body once per bad value, with good ones in place of all others."""
     whole, num_sites = json.dumps(body), json.dumps(body).count(json.dumps(bad))
     for place in range(num_sites):
         parts = whole.split(json.dumps(bad))
@@ -98,12 +98,12 @@ def test_texts_that_no_export_can_carry_are_refused(client: httpx.Client, text: 
     for path in ("/v1/jobs?label=", "/v1/audit-events?kind=", "/v1/satellites/"):
         query = f"a{text}b".encode("utf-8", "surrogatepass")
         answer = client.get(f"{path}{''.join(f'%{byte:02x}' for byte in query)}")
-        # Half a pair arrives as the sign of what could not be read.
+        # A lone surrogate arrives as the replacement character.
         assert answer.status_code == 422 or "\ud800" <= text <= "\udfff", (path, answer.text)
 
 
 def texts_of(schema: Document, schemas: Document, place: str) -> Iterator[tuple[str, Document]]:
-    """Yield every text that a schema lets in, with its place; each named schema once."""
+    """Yield every text that a schema accepts, with its position; each named schema once."""
     if "$ref" in schema:
         name = schema["$ref"].rsplit("/", 1)[1]
         yield from texts_of(schemas.pop(name, {}), schemas, name)
@@ -128,7 +128,7 @@ def lets_in(schema: Document, text: str) -> bool:
 
 def test_every_text_of_every_body_is_under_the_one_rule() -> None:
     document = contract().document
-    schemas = dict(document["components"]["schemas"])  # each is taken out once it is read
+    schemas = dict(document["components"]["schemas"])  # each is removed once it is read
     bodies_of = [
         operation["requestBody"]["content"]["application/json"]["schema"]
         for operations in document["paths"].values()
@@ -143,7 +143,7 @@ def test_every_text_of_every_body_is_under_the_one_rule() -> None:
         for text in BAD_TEXTS
         if not "\ud800" <= text <= "\udfff" and lets_in(schema, f"a{text}b")
     }
-    # These have parsers of their own, which the next test asks.
+    # These have their own parsers, which the next test covers.
     assert loose == {"OrbitIn.tle/0[]", "SatelliteIn.tle/0[]", "WebhookIn.url"}
 
 
@@ -187,7 +187,7 @@ def test_a_what_if_refuses_them_too(client: httpx.Client, jobs: Jobs) -> None:
 
 
 def amounts(value: float, shortest: float) -> Document:
-    """Return a mission all of whose amounts are this large, or this small."""
+    """Return a mission with all its amounts this large, or this small."""
     file = paper_mission(drawn_targets(12))
     for wanted in file["targets"]:
         wanted |= {"reward": value, "collect_s": shortest}

@@ -1,4 +1,4 @@
-"""Addresses of the internet that gateways lead back into a network."""
+"""Internet addresses that gateways translate back into a private network."""
 
 from __future__ import annotations
 

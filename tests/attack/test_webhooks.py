@@ -1,4 +1,4 @@
-"""Receivers that never answer, and what the others' messages wait for."""
+"""Receivers that never answer, and how long other owners' messages wait."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SILENT = "silent"
 
 @pytest.fixture
 def silent_url(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """A receiver that takes connections and says nothing, which a courier waits for at length."""
+    """A receiver that accepts connections and says nothing; couriers wait long for it."""
     monkeypatch.setattr(couriers, "_ANSWER_WITHIN_S", 10 * PATIENCE_S)
     with socket.create_server(("127.0.0.1", 0), backlog=1000) as listener:
         yield f"http://127.0.0.1:{listener.getsockname()[1]}/"
@@ -51,7 +51,7 @@ def test_a_silent_receiver_holds_up_no_other_owner(
         queue_tests(post, webhook_id, 30)
     webhook = post.webhook("/mine", OTHERS)
     with courier():
-        # So long as it takes until all places that the silent one can have are taken.
+        # Until all slots that the silent receiver can occupy are taken.
         wait_until(lambda: sum(row.attempts for row in post.rows()) >= 4)
         key = post.door.key("submit", OTHERS)
         post.door.client.post(f"{webhook['links']['self']}/test", headers=key)

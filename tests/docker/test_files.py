@@ -1,4 +1,4 @@
-"""The image and the compose file say what the program understands; no engine is needed to see."""
+"""The image and the compose file match what the program understands; checked without Docker."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def compose() -> dict[str, Any]:
 
 
 def variables(text: str) -> dict[str, str]:
-    """Return the variables that compose puts in, with what follows their names."""
+    """Return the variables that compose substitutes, with what follows their names."""
     return dict(re.findall(r"\$\{(\w+)([^}]*)\}", text))
 
 

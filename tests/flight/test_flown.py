@@ -1,4 +1,4 @@
-"""Plans flown in Basilisk, which knows nothing of the planner: see docs/flight.md."""
+"""Plans flown in Basilisk, which is independent of the planner: see docs/flight.md."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _scenario(**changes: Any) -> dict[str, Any]:
         "release": 2,
         **changes,
     }
-    # As the service would answer it: with all of the spacecraft in it.
+    # As the service would return it: with the complete spacecraft.
     expanded: dict[str, Any] = json.loads(canonical(content))
     return expanded
 

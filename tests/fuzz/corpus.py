@@ -1,4 +1,4 @@
-"""Files that parsers accept, or nearly: what mutations start from."""
+"""Files that parsers accept, or nearly: the starting points of mutations."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def seeds(parser: str) -> list[bytes]:
 
 
 def shared_seeds(parser: str, folder: Path) -> list[bytes]:
-    """Return the beginnings of the shared files that a parser might be given."""
+    """Return the beginnings of the shared files that a parser might receive."""
     what, _, kind = parser.partition(" ")
     places = {"elements": ("elements", "omm"), "targets": ("targets",), "stations": ("stations",)}
     return [

@@ -1,8 +1,8 @@
 """Coverage-guided fuzzing of all parsers: ``python -m tests.fuzz.guided [RUNS] [PARSER]``.
 
 `Atheris <https://github.com/google/atheris>`_ watches which branches each input takes and keeps
-on changing those that took new ones. It has wheels for Linux only, so it is no dependency:
-``make fuzz`` brings it. The number of runs is fixed, not the time, and so is the seed.
+mutating those that took new ones. It has wheels for Linux only, so it is no dependency:
+``make fuzz`` installs it. The number of runs is fixed, not the time, and so is the seed.
 """
 
 from __future__ import annotations

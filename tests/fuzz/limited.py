@@ -1,6 +1,6 @@
-"""What a process does that is given one nasty file and little memory.
+"""The work of a process that is given one nasty file and little memory.
 
-The fork server of these processes imports this module, so that none of them imports anything.
+The fork server of these processes imports this module, so that they import nothing themselves.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from tests.fuzz.nasty import NASTIES
 from tests.fuzz.parsers import PARSERS
 
 Sizes = tuple[int, int]
-"""Of a file, and of the memory that it may take."""
+"""Size of a file, and of the memory that parsing it may take."""
 
 
 def parse_one(number: int, sizes: Sizes) -> None:
-    """Give one of the nasty files to each parser of its kinds."""
+    """Give one of the nasty files to each parser of its media types."""
     file = NASTIES[number]
     data = file.make(sizes[0])
     _limit_memory(sizes)
@@ -27,7 +27,7 @@ def parse_one(number: int, sizes: Sizes) -> None:
 
 
 def hoard(times: int, sizes: Sizes) -> None:
-    """Take so many times the memory that there is."""
+    """Allocate this many times the allowed memory."""
     _limit_memory(sizes)
     bytearray(times * sizes[1])
 

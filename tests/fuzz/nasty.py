@@ -22,7 +22,7 @@ _TARGETS: Final = '{"name":"n","targets":['
 
 @dataclass(frozen=True, slots=True)
 class Nasty:
-    """A file, and the media types it may claim to be of; ``make`` takes its size in bytes."""
+    """A file and the media types it may claim; ``make`` takes its size in bytes."""
 
     name: str
     kinds: tuple[str, ...]
@@ -30,7 +30,7 @@ class Nasty:
 
 
 def repeated(name: str, kinds: tuple[str, ...], unit: str, start: str = "", end: str = "") -> Nasty:
-    """Return a file that says the same again and again."""
+    """Return a file that repeats the same unit."""
     return Nasty(
         name, kinds, lambda size: (start + unit * (size // len(unit.encode())) + end).encode()
     )

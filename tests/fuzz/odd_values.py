@@ -1,4 +1,4 @@
-"""Small files with values that are not what they seem: not finite, not text, twice the same."""
+"""Small files with misleading values: not finite, not text, given twice."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.fuzz.nasty import ALL, CSV, GEO, JSON, TEXT, XML
 from tests.planner_core.orbits.element_sets import LINE_1, LINE_2, omm
 
 Odd = tuple[str, tuple[str, ...], bytes]
-"""What it is, the media types it may claim to be of, and the file."""
+"""A description, the media types it may claim, and the file."""
 
 NUMBERS: Final = ("NaN", "Infinity", "-Infinity", "1e308", "1e400", "-1e400", "0x10", "1_000", "٣")
 LONG_NUMBERS: Final = ("9" * 5000, "1" + "0" * 400, "0." + "9" * 5000, "1e" + "9" * 5000)

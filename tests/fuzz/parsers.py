@@ -1,7 +1,7 @@
-"""Every parser of files that the service has, and what must hold whatever it is given.
+"""Every parser of files that the service has, and what must hold for any input.
 
-A parser never raises, and it takes nothing that the planner could stumble over: all that is
-accepted is finite, within its limits, and can be stored and read again.
+A parser never raises, and accepts nothing that the planner could stumble over: all accepted data
+is finite, within its limits, and can be stored and read again.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def _check_entry(entry: Entry) -> None:
         assert not isinstance(value, float) or math.isfinite(value)
     if "tle" in entry.orbit:
         again = read_tle(entry.orbit["tle"]).elements
-        assert astuple(again)[1:] == astuple(entry.elements)[1:]  # the name stood beside it
+        assert astuple(again)[1:] == astuple(entry.elements)[1:]  # the name is stored beside it
     else:
         assert elements_from_omm(json.loads(json.dumps(entry.orbit["omm"]))) == entry.elements
     _check_faults(entry.warnings)
@@ -92,7 +92,7 @@ def _points(read: Callable[[bytes], list[dict[str, Any]]]) -> Parser:
 
 def _check_storable(document: object) -> None:
     json.dumps(document, allow_nan=False, ensure_ascii=False).encode()
-    assert "\x00" not in json.dumps(document, ensure_ascii=False)  # PostgreSQL has no place for it
+    assert "\x00" not in json.dumps(document, ensure_ascii=False)  # PostgreSQL cannot store it
 
 
 def _check_faults(faults: Sequence[Fault]) -> None:

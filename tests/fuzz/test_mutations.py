@@ -1,4 +1,4 @@
-"""Whatever becomes of a good file on its way, the parsers say what is wrong with it."""
+"""However a good file is damaged, the parsers say what is wrong with it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PIECES = (
 
 @st.composite
 def mutated(draw: st.DrawFn, files: list[bytes]) -> bytes:
-    """Return a file with some pieces cut out, put in, or repeated."""
+    """Return a file with some pieces removed, inserted or repeated."""
     data = draw(st.sampled_from(files))
     for _ in range(draw(st.integers(1, 5))):
         start = draw(st.integers(0, len(data)))

@@ -1,4 +1,4 @@
-"""No file takes the service's parsers long, or much memory, or makes one raise."""
+"""No file takes the service's parsers long or much memory, or makes one raise."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ SIZES: Final = [
     (200_000, 50_000_000),
     pytest.param((2_000_000, 250_000_000), marks=pytest.mark.full_size),
 ]
-"""A good hundred bytes of memory for each of the file; JSON takes about thirty at most."""
+"""At least 125 bytes of memory per byte of the file; JSON takes at most about thirty."""
 DEADLINE_S: Final = 120.0
-"""Far beyond the second or two that the slowest take: for what would take hours."""
+"""Far beyond the second or two of the slowest: it catches files that would take hours."""
 
 CONTEXT = get_context("forkserver")
 CONTEXT.set_forkserver_preload([parse_one.__module__])
@@ -37,7 +37,7 @@ def test_what_takes_too_much_memory_is_noticed(sizes: Sizes) -> None:
 
 
 def status_of(work: Callable[[int, Sizes], None], argument: int, sizes: Sizes) -> int | None:
-    """Return the exit status of a process that does some work, below zero where it was killed."""
+    """Return the exit status of a process that does some work; negative if it was killed."""
     process = CONTEXT.Process(target=work, args=(argument, sizes))
     process.start()
     process.join(DEADLINE_S)

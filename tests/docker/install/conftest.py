@@ -1,4 +1,4 @@
-"""What is installed, once for all tests of this folder, as users and as the image's build do."""
+"""Installations, made once for all tests of this folder, as by users and by the image's build."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ ROOT = Path(__file__).resolve().parents[3]
 _KERNEL_FOLDER = "from planner_core.kernel_folder import kernel_folder; print(kernel_folder())"
 
 COMPILED = os.environ.get("SLEWLINE_TEST_KERNELS")
-"""Where kernels are as the warm-up of this checkout left them, before any test had more compiled:
+"""Folder of the kernels from this checkout's warm-up, copied before tests compiled any others:
 in ``demonstration`` those of its first part, in ``all`` those of the whole. Without it each
-installation compiles all of its own, which takes minutes."""
+installation compiles all its own kernels, which takes minutes."""
 
 _LEFT_TO_USER = "planner_core.referee.delivery"
 _LEFT_TO_IMAGE = "planner_core.certified.dp.start_labels"
-"""Modules whose kernels no kernel of another module needs; the first one's the demonstration does.
+"""Modules whose kernels no kernel of another module needs; the demonstration uses the first one's.
 """
 
 
@@ -37,23 +37,23 @@ class Distribution:
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """An environment with nothing but the wheel and what it asks for; where its user works."""
+    """An environment with only the wheel and its requirements, and the user's working folder."""
 
     folder: Path
 
     def run(self, program: str, *arguments: str) -> str:
-        """Run a program of the environment, and return what it says."""
+        """Run a program of the environment, and return its output."""
         return run(self.folder / "venv" / "bin" / program, *arguments, cwd=self.folder)
 
     @property
     def kernels(self) -> Path:
-        """Where the program keeps what it compiles."""
+        """The program's folder for compiled kernels."""
         return Path(self.run("python", "-c", _KERNEL_FOLDER).strip())
 
 
 @dataclass(frozen=True, slots=True)
 class Demonstrated:
-    """What ``slewline demo`` says in a new environment, and then again."""
+    """The output of ``slewline demo`` in a new environment, and of a second run."""
 
     user: User
     said: str
@@ -61,7 +61,7 @@ class Demonstrated:
 
 
 def run(*command: str | Path, cwd: Path) -> str:
-    """Run a command that sees nothing of this tree but what it is told."""
+    """Run a command that sees nothing of this tree except its arguments."""
     environment = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
     environment["XDG_DATA_HOME"] = str(cwd / "data")
     done = subprocess.run(
@@ -89,7 +89,7 @@ def user(dist: Distribution, tmp_path_factory: pytest.TempPathFactory) -> User:
 
 
 def compiled(part: str, left: str) -> list[Path]:
-    """Return the folders of this checkout's kernels, but that of one module; without them none."""
+    """Return the folders of this checkout's kernels except one module's; none if not given."""
     folders = sorted(Path(COMPILED, part).glob("planner_core.*")) if COMPILED else []
     taken = [folder for folder in folders if folder.name != left]
     assert len(taken) == max(len(folders) - 1, 0)
@@ -98,9 +98,9 @@ def compiled(part: str, left: str) -> list[Path]:
 
 @pytest.fixture(scope="session")
 def demonstrated(user: User) -> Demonstrated:
-    """What the warm-up of this checkout has compiled the first run finds there, but for a module.
+    """Run the demonstration, given the kernels of this checkout's warm-up except one module's.
 
-    To compile all of it would take more than a minute of processor time once more.
+    Compiling all of them again would take more than a minute of processor time.
     """
     for folder in compiled("demonstration", _LEFT_TO_USER):
         shutil.copytree(folder, user.kernels / folder.name)
@@ -110,10 +110,10 @@ def demonstrated(user: User) -> Demonstrated:
 
 @pytest.fixture(scope="session")
 def prefix(demonstrated: Demonstrated) -> Iterator[Path]:
-    """The program as the image has it, in a folder that all may read.
+    """The program as in the image, in a folder that everybody may read.
 
-    What the demonstration has compiled its build finds there, and what else the warm-up of this
-    checkout has, but for a module.
+    Its build is given the kernels that the demonstration has compiled and the others of this
+    checkout's warm-up, except one module's.
     """
     folder = Path(tempfile.mkdtemp())
     folder.chmod(0o755)

@@ -1,4 +1,4 @@
-"""What the image's build runs, without an engine: installed by root, run by nobody, read-only.
+"""The commands of the image's build, without Docker: installed by root, run by nobody, read-only.
 
 Not among the ordinary tests: it takes minutes and the package index. ``.ci/run`` runs it.
 """
@@ -21,13 +21,13 @@ from tests.patience import PATIENCE_S
 from tests.service import factories
 
 AS_NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
-# It may read all the same: the interpreter may lie in a folder of root's own.
+# It may read everything: the interpreter may lie in a private folder of root.
 AS_NOBODY += ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
 
 
 @pytest.fixture
 def scratch() -> Iterator[Path]:
-    """What a container may write to."""
+    """The folder that a container may write to."""
     folder = Path(tempfile.mkdtemp())
     os.chown(folder, 65534, 65534)
     yield folder

@@ -1,4 +1,4 @@
-"""What is compiled once the warm-up is through: every kernel, each for one signature."""
+"""The kernels compiled after the warm-up: all of them, each for one signature."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ print(json.dumps(stored_signatures()))
 
 
 def stored(python: Path) -> dict[str, list[str]]:
-    """Return with which arguments each kernel of an installation is compiled, by its name."""
+    """Return the compiled signatures of each kernel of an installation, by its name."""
     found: dict[str, list[str]] = json.loads(run(python, "-c", _ASK, cwd=python.parent))
     return found
 
