@@ -138,7 +138,7 @@ def _told(scenario: Scenario) -> str:
         f"share {objective.collected_share}",
         f"half-life {objective.half_life_s}",
         f"spacing {scenario.collect_spacing_s}",
-        "free starts" if scenario.continuous_starts else "",
+        "continuous starts" if scenario.continuous_starts else "",
         "clouds" if scenario.forecast else "",
         "quality" if scenario.quality else "",
         "outage" if scenario.outages else "",

@@ -27,7 +27,7 @@ from planner_core.certified.strategies.every import solved
 from planner_core.certified.tuning import TUNING
 from planner_core.domain import Agility
 from planner_core.precedence.earliest_starts import follows_at_s
-from planner_core.precedence.time_windows import spans_of, view_of
+from planner_core.precedence.time_windows import time_windows_of, view_of
 from planner_core.problem import (
     COLLECT,
     CONTACT,
@@ -59,11 +59,11 @@ AGILITIES = st.sampled_from(
 
 
 def best_reward(problem: Problem) -> float:
-    """Return the best reward of one satellite with free starts, by trying every sequence.
+    """Return the best reward of one satellite with continuous starts, by trying every sequence.
 
     Its slews are faster than its lines of sight, so each task is best begun as early as possible.
     """
-    spans, view = spans_of(problem, 0), view_of(problem, 0)
+    spans, view = time_windows_of(problem, 0), view_of(problem, 0)
     reward = problem.best_worth
     best = 0.0
 
@@ -195,7 +195,7 @@ def test_bounds_can_be_checked_and_false_ones_are_refused() -> None:
 
 
 def test_what_bounds_fixed_starts_is_not_taken_for_free_ones() -> None:
-    """Computed from the opportunities alone, such a bound may be below a plan with free starts."""
+    """A bound over the opportunities alone may lie below a plan with continuous starts."""
     problem = flat_problem(3, num_targets=14, horizon_s=700.0)
     grid = replace(problem, continuous_starts=False, pointing=None)
     bound = Certified().solve(grid, Budget(), 0).proven
@@ -319,7 +319,7 @@ def test_pins_hold_and_blocked_intervals_stay_empty(seed: int) -> None:
     timeline = replay(pinned, search.plan)
     assert not timeline.violations
     assert any(a.opportunity == kept for a in search.plan.actions)
-    spans = spans_of(pinned, 0)
+    spans = time_windows_of(pinned, 0)
     is_before = spans.close_s + spans.length_s <= from_s + 1e-6
     assert (is_before | (spans.open_s >= from_s + 60.0 - 1e-6)).all()
 

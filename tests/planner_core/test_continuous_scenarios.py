@@ -71,7 +71,7 @@ def test_every_solver_answers_such_a_scenario(name: str, use_resources: bool) ->
     assert answer.timeline.reward <= answer.bound.value + 1e-9
 
 
-def test_each_target_left_out_has_a_reason_true_of_free_starts(judged: Judged) -> None:
+def test_each_target_left_out_has_a_reason_true_of_continuous_starts(judged: Judged) -> None:
     """If the actions named as blocking are removed, the image fits, judged by the referee."""
     problem, plan = judged.problem, judged.solution.plan
     left = [o for o in judged.outcomes if o.reason is not None and o.reason.blocking]

@@ -204,9 +204,10 @@ KINDS: Final = {
                                       agility=MOVING),
     "aging": _late(random_problem(1, num_collects=20, num_contacts=2)),
     "aging fleet": _late(random_problem(1, num_collects=20, num_contacts=2, num_satellites=2)),
-    "free starts": flat_problem(1, num_targets=8),
-    "free starts with limits": flat_problem(1, num_targets=8, num_contacts=2, use_resources=True,
-                                            spacing_s=60.0),
+    "continuous starts": flat_problem(1, num_targets=8),
+    "continuous starts with limits": flat_problem(
+        1, num_targets=8, num_contacts=2, use_resources=True, spacing_s=60.0
+    ),
 }  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def test_what_highs_leaves_open_is_not_called_optimal(
         "planner_core.certified.incumbent.accessible", lambda _: Bound(value=np.inf, proof="milp")
     )
     for module in ("certified.strategies.supports", "solvers.milp"):
-        monkeypatch.setattr(f"planner_core.{module}.is_free", lambda _: False)
+        monkeypatch.setattr(f"planner_core.{module}.is_agility_only", lambda _: False)
     solution = solver.solve(problem, Budget(), 0)
     assert solution.bound is not None
     reward = replay(problem, solution.plan).reward

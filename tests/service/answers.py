@@ -7,18 +7,18 @@ from collections.abc import Iterable, Iterator
 from datetime import datetime
 
 from service.answers.answered import Answered
-from service.answers.blocks import (
-    Block,
+from service.answers.chunks import (
+    Chunk,
     Document,
     Entry,
     contents_of,
-    target_blocks,
-    timeline_blocks,
+    target_chunks,
+    timeline_chunks,
 )
 
 
-def blocks_of_timeline(timeline: Document) -> Iterator[Block]:
-    """Yield the blocks of a complete timeline."""
+def chunks_of_timeline(timeline: Document) -> Iterator[Chunk]:
+    """Yield the chunks of a complete timeline."""
 
     def parts(satellite: Document) -> tuple[Document, list[Document], Document]:
         about = {name: satellite[name] for name in ("id", "name")}
@@ -26,17 +26,17 @@ def blocks_of_timeline(timeline: Document) -> Iterator[Block]:
         return about, satellite["actions"], rest
 
     head = {name: value for name, value in timeline.items() if name != "satellites"}
-    return timeline_blocks(head, (parts(one) for one in timeline["satellites"]))
+    return timeline_chunks(head, (parts(one) for one in timeline["satellites"]))
 
 
 def answered_of(timeline: str, targets: str, content: str, finished_at: datetime) -> Answered:
     """Return a job's answer from its texts; ``content`` is its scenario file."""
-    blocks: list[Block] = [
-        *blocks_of_timeline(json.loads(timeline)),
-        *target_blocks(json.loads(targets)),
+    chunks: list[Chunk] = [
+        *chunks_of_timeline(json.loads(timeline)),
+        *target_chunks(json.loads(targets)),
     ]
 
     def texts(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
-        return ((entry, blocks[entry.position].text) for entry in entries)
+        return ((entry, chunks[entry.position].text) for entry in entries)
 
-    return Answered(contents_of(blocks), texts, content, finished_at)
+    return Answered(contents_of(chunks), texts, content, finished_at)

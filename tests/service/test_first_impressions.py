@@ -1,7 +1,7 @@
-"""What got in the way of those who tried the first release, point by point.
+"""Obstacles that the first users of the first release met, point by point.
 
-Each of the fifteen is shown by the tests that its line of ``SHOWN_BY`` names; those that no other
-module has are here. Numbers are the issue's.
+Each of the fifteen is covered by the tests on its line of ``SHOWN_BY``; those without a test in
+another module are here. Numbers are the issue's.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ SHOWN_BY: Final = {
     ),
 }
 
-# As the first release had them, and what they stood for.
+# Texts of the first release that users did not understand.
 JARGON: Final = (
     r"Certified planning\. exact", r"Not in the paper\.", r"bound \((dp|milp|lagrangian|totals)\)",
     r"\d recorder capacities", r"element sets taken", r"left out for displaced by",
@@ -170,7 +170,7 @@ def test_an_image_longer_than_its_accesses_is_named_as_the_cause(mission: Missio
 
 
 def asked_of(client: httpx.Client, targets: list[dict[str, Any]], own: dict[str, Any]) -> Document:
-    """Return a stored scenario with a station, of one satellite."""
+    """Return a stored scenario with one station and one satellite."""
     fields = {
         "satellite_ids": [post(client, "/v1/satellites", own)["id"]],
         "ground_station_ids": [post(client, "/v1/ground-stations", ground_station())["id"]],
@@ -184,7 +184,7 @@ def planned(mission: Mission, scenario: Document) -> Document:
 
 
 def test_swapped_latitude_and_longitude_are_told(service: Service) -> None:
-    # In the east of Brazil; the other way round off Antarctica.
+    # In eastern Brazil; off Antarctica if swapped.
     places = [(lat, lon) for lat in (-12.0, -9.0, -6.0) for lon in (-62.0, -58.0, -54.0, -50.0)]
     for is_swapped in (False, True):
         rows = [
@@ -253,9 +253,9 @@ def test_the_document_names_things_as_people_do() -> None:
     names = [operation["operationId"] for operation in operations]
     names += [tag for operation in operations for tag in operation["tags"]]
     names += list(document["paths"]) + list(document["components"]["schemas"])
-    # One spelling in what becomes code; prose has the British one.
+    # One spelling in identifiers; prose is British.
     assert [name for name in names if "catalogue" in name.lower()] == []
-    # What FastAPI makes of a function's name is no summary.
+    # A summary that FastAPI derives from a function's name is not good enough.
     made = [
         operation["summary"]
         for operation in operations

@@ -54,13 +54,13 @@ def http(service: Mission) -> Iterator[httpx.Client]:
 
 
 def read(model: type[M], answer: httpx.Response) -> M:
-    """Return an answer as the community's models read it."""
+    """Return an answer as read by the community's models."""
     assert answer.is_success, answer.text
     return model.model_validate_json(answer.content)
 
 
 def follow(http: httpx.Client, links: list[Link], rel: str) -> httpx.Response:
-    """Follow the link of a relation, as STAPI's clients find their way."""
+    """Follow the link of a relation, as STAPI clients do."""
     (link,) = (one for one in links if one.rel == rel)
     return http.request(link.method or "GET", str(link.href), json=link.body)
 
@@ -157,7 +157,7 @@ def test_orders_are_listed_page_by_page(http: httpx.Client) -> None:
 
 
 def test_a_filter_narrows_searches_and_orders(http: httpx.Client) -> None:
-    # What there is hangs on the day, and a page may be full with and without a filter.
+    # The opportunities depend on the date, and a page may be full with and without a filter.
     asked = ASKED | {"limit": 100}
     everything = read(Found, http.post("/stapi/products/paper/opportunities", json=asked))
     angles = sorted(one.properties.off_nadir_deg for one in everything.features)  # type: ignore[union-attr]

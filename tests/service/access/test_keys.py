@@ -1,4 +1,4 @@
-"""Who may pass: keys, scopes, and what a refusal says."""
+"""Who has access: keys, scopes, and the content of a refusal."""
 
 from __future__ import annotations
 

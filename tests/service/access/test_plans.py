@@ -166,11 +166,11 @@ def test_each_violation_wants_a_waiver(desk: Desk) -> None:
          "actions": ["a1"], "detail": f"The {code} is too short."}
         for code in ("slew", "slew", "battery", "duplicate")
     ]  # fmt: skip
-    head = json.loads(desk.mission.blocks[0].text + "]}")
+    head = json.loads(desk.mission.chunks[0].text + "]}")
     head |= {"violations": broken, "validity": "violations"}
     text = json.dumps(head)[: -len("]}")]
-    blocks = (replace(desk.mission.blocks[0], text=text), *desk.mission.blocks[1:])
-    plan = desk.draft(key, desk.answered_job(key, blocks))
+    chunks = (replace(desk.mission.chunks[0], text=text), *desk.mission.chunks[1:])
+    plan = desk.draft(key, desk.answered_job(key, chunks))
     # A target imaged twice is no violation.
     assert [each["code"] for each in plan["violations"]] == ["slew", "slew", "battery"]
     refused = desk.move(plan, "approved", key)

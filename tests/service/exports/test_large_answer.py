@@ -1,4 +1,4 @@
-"""A huge answer: a page reads only its own blocks, and no form holds the answer as a whole."""
+"""A huge answer: a page reads only its own chunks, and no form holds the answer as a whole."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import httpx
 import pytest
 import sqlalchemy as sa
 
-from service.answers.blocks import NUM_ITEMS, target_blocks
-from service.db.rows import JobBlockRow
+from service.answers.chunks import NUM_ITEMS, target_chunks
+from service.db.rows import JobChunkRow
 from service.exports.forms import FORMS
 from tests.missions import Document
-from tests.service.answers import blocks_of_timeline
+from tests.service.answers import chunks_of_timeline
 from tests.service.conftest import Service
 from tests.service.exports.conftest import Mission, store_job
 
 NUM_TARGETS = 12_000
 NUM_LEFT_OUT = 4_000
 BLOCK_BYTES = 100_000
-"""Approximate size of a block of this answer."""
+"""Approximate size of a chunk of this answer."""
 NUM_HELD = 30
 """Blocks in memory at a time, as text and as objects made of them (tracks need most)."""
 
@@ -67,22 +67,22 @@ def large_mission(mission: Mission) -> Mission:
         targets.append(told | rest)
     timeline["satellites"][0]["actions"] = actions
     timeline["satellites"][1]["actions"] = []
-    blocks = (*blocks_of_timeline(timeline), *target_blocks(targets))
+    chunks = (*chunks_of_timeline(timeline), *target_chunks(targets))
     content = json.dumps(file, sort_keys=True, separators=(",", ":"))
-    return Mission(content=content, blocks=blocks)
+    return Mission(content=content, chunks=chunks)
 
 
 @pytest.fixture
 def large(service: Service, mission: Mission) -> Large:
     found = large_mission(mission)
-    size = sum(len(block.text) for block in found.blocks)
+    size = sum(len(chunk.text) for chunk in found.chunks)
     path = store_job(service, found)
     return Large(path=path, question_size=len(found.content), answer_size=size)
 
 
 def spoil_targets(service: Service, *firsts: int) -> None:
-    """Make all blocks of targets unreadable except those that begin with these numbers."""
-    row = JobBlockRow
+    """Make all chunks of targets unreadable except those that begin with these numbers."""
+    row = JobChunkRow
     with service.database.transaction() as session:
         others = sa.and_(row.kind == "targets", row.first.not_in(firsts))
         session.execute(sa.update(row).where(others).values(text="no JSON"))
@@ -129,7 +129,7 @@ def test_no_form_holds_the_answer_as_a_whole(
     client: httpx.Client, large: Large, suffix: str
 ) -> None:
     assert large.answer_size > 2 * NUM_HELD * BLOCK_BYTES
-    # Forms that show targets' positions hold the scenario as text; all else is held by the block.
+    # Forms that show targets' positions hold the scenario as text; all else is held by the chunk.
     question = 0 if suffix == "json" else large.question_size
     # Not the client that checks answers against their schema: it reads them whole.
     address = client.base_url.join(f"{large.path}/timeline.{suffix}")

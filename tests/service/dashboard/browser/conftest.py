@@ -1,4 +1,4 @@
-"""The real service, and Chromium driven without a window. `.ci/browser` installs it."""
+"""The real service, and headless Chromium. `.ci/browser` installs it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ document.addEventListener("securitypolicyviolation", (event) =>
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browser:
-    """A page in the browser, and what it said and asked for on the way."""
+    """A page in the browser, with its console messages and requests."""
 
     driver: webdriver.Chrome
     url: str
@@ -41,16 +41,16 @@ class Browser:
         self.driver.get(self.url + path)
 
     def run(self, script: str, *arguments: object) -> Any:
-        """Return what a function body in JavaScript returns."""
+        """Run a function body in JavaScript and return its result."""
         return self.driver.execute_script(script, *arguments)
 
     def find(self, selector: str) -> WebElement:
-        """Return the one element."""
+        """Return the first element that matches."""
         return self.driver.find_element("css selector", selector)
 
     def text(self, selector: str) -> str:
-        """Return the text that is seen of an element; "" where there is none."""
-        # In one step: pages replace elements while they are looked at.
+        """Return the visible text of an element; "" if there is none."""
+        # In one step: pages replace elements during the look-up.
         script = """
           const found = document.querySelector(arguments[0]);
           return found?.checkVisibility() ? found.innerText.trim() : "";
@@ -58,7 +58,7 @@ class Browser:
         return str(self.run(script, selector))
 
     def click(self, selector: str) -> None:
-        """Click an element as soon as it can be."""
+        """Click an element as soon as it is clickable."""
         script = """
           const found = document.querySelector(arguments[0]);
           return found?.checkVisibility() && !found.disabled;
@@ -68,7 +68,7 @@ class Browser:
         self.find(selector).click()
 
     def wait(self, is_so: Callable[[], object], what: str = "") -> None:
-        """Wait until something is so."""
+        """Wait until a condition holds."""
         wait_until(is_so, lambda: f"{what}\n{self.text('main')[:2000]}")
 
     def wait_for_answer(self) -> str:
@@ -78,31 +78,31 @@ class Browser:
         return f"/v1/jobs/{self.driver.current_url.rpartition('/')[2]}"
 
     def drawn(self, plot: str) -> int:
-        """Return how many times a canvas has been drawn."""
+        """Return how often a canvas has been drawn."""
         script = "return document.querySelector(`#${arguments[0]} canvas`)?.dataset.drawn"
         return int(self.run(script, plot) or 0)
 
     def watch(self) -> None:
-        """Start anew: forget the tab's key and what was said so far."""
+        """Reset: forget the tab's key and all messages so far."""
         self.open("/problems/not-found")
         self.run("sessionStorage.clear()")
         self.driver.get_log("browser")  # type: ignore[no-untyped-call]
         self.driver.get_log("performance")  # type: ignore[no-untyped-call]
 
     def complaints(self) -> list[str]:
-        """Return what the console, the policy and the network log hold against the page."""
+        """Return the complaints of the console, the policy and the network log about the page."""
         said: list[dict[str, Any]] = self.driver.get_log("browser")  # type: ignore[no-untyped-call]
         found = [entry["message"] for entry in said if entry["level"] in ("SEVERE", "WARNING")]
         found += self.run("return window.policyViolations ?? []")
         return found + [f"asked for {url}" for url in self.requests() if self.is_elsewhere(url)]
 
     def is_elsewhere(self, url: str) -> bool:
-        """Return whether an address is of another host."""
+        """Return whether an address belongs to another host."""
         parts = urlsplit(url)
         return parts.scheme in ("http", "https", "ws", "wss") and not url.startswith(self.url)
 
     def requests(self) -> list[str]:
-        """Return every address that the browser has asked for since the last call."""
+        """Return every address that the browser has requested since the last call."""
         log: list[dict[str, Any]] = self.driver.get_log("performance")  # type: ignore[no-untyped-call]
         events = [json.loads(entry["message"])["message"] for entry in log]
         sent = [e["params"] for e in events if e["method"] == "Network.requestWillBeSent"]
@@ -110,18 +110,18 @@ class Browser:
 
 
 def start_chromium() -> webdriver.Chrome:
-    """Return a browser without a window; the caller ends it."""
+    """Return a headless browser; the caller ends it."""
     options = webdriver.ChromeOptions()
     options.binary_location = _CHROMIUM
     for argument in (
         "--headless=new",
-        "--no-sandbox",  # as root there is none
+        "--no-sandbox",  # which root cannot use
         "--disable-dev-shm-usage",
         "--disable-gpu",
         "--disable-background-networking",
         "--disable-component-update",
         "--force-device-scale-factor=1",
-        "--lang=de-DE",  # pages must show UTC in their own form whatever the country
+        "--lang=de-DE",  # pages must show UTC in their own format in any locale
     ):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
@@ -160,7 +160,7 @@ def driver() -> Iterator[webdriver.Chrome]:
 
 @pytest.fixture
 def browser(driver: webdriver.Chrome, service_url: str) -> Iterator[Browser]:
-    """A page that must not complain: no error, no other host, no breach of the policy."""
+    """A page without complaints: no error, no other host, no violation of the policy."""
     page = Browser(driver=driver, url=service_url)
     page.watch()
     yield page

@@ -44,7 +44,7 @@ def opened(url: str) -> Iterator[Browser]:
 
 
 def colors(browser: Browser, scheme: str) -> None:
-    """Ask for light or dark."""
+    """Set the light or dark colour scheme."""
     media = [{"name": "prefers-color-scheme", "value": scheme}]
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
 
@@ -52,19 +52,19 @@ def colors(browser: Browser, scheme: str) -> None:
 def take(
     browser: Browser, name: str, height: int, top: str = "header", *, width: int = WIDTH
 ) -> None:
-    """Write a picture of the page from an element on."""
+    """Write a picture of the page from an element downwards."""
     show_at(browser, width, height)
     browser.run(
         "document.activeElement.blur(); document.querySelector(arguments[0])"
         ".scrollIntoView({block: 'start'})",
         top,
     )
-    # Canvases are drawn anew at their new width.
+    # Canvases are redrawn at their new width.
     browser.driver.execute_async_script("const [done] = arguments; setTimeout(done, 500);")
     path = FOLDER / f"{name}.png"
     browser.driver.save_screenshot(str(path))
     with Image.open(path) as picture:
-        # Small marks keep their colour: they say most.
+        # Small marks keep their colour: they matter most.
         few = picture.convert("RGB").quantize(NUM_COLORS, Image.Quantize.MAXCOVERAGE)
     few.save(path, optimize=True)
     size = path.stat().st_size
@@ -73,7 +73,7 @@ def take(
 
 
 def compared(api: httpx.Client, scenario_id: str) -> Json:
-    """Compare the solvers that are quick; return the comparison."""
+    """Compare the quick solvers; return the comparison."""
     names = ("rule", "graph", "forward_search", "mcts", "certified")
     body = {
         "scenario_id": scenario_id,
@@ -88,7 +88,7 @@ def compared(api: httpx.Client, scenario_id: str) -> Json:
 
 
 def select_blocked(browser: Browser) -> None:
-    """Select a target that others displace: it has most to tell."""
+    """Select a target that others displace: it has the longest explanation."""
     displaced = "[data-reason=displaced_by]"
     is_there = browser.driver.find_elements("css selector", displaced)
     group = f"#left-out details{displaced if is_there else '[data-reason=slew_conflict]'}"
@@ -98,7 +98,7 @@ def select_blocked(browser: Browser) -> None:
 
 
 def shift(api: httpx.Client, browser: Browser, scenario_id: str) -> dict[str, tuple[str, str]]:
-    """Publish a plan and its change, and picture the plan and the wall; return where they are."""
+    """Publish a plan and its change, and picture the plan and the wall; return their addresses."""
     job = planned(api, scenario_id, "certified")
     plan = post(api, "/v1/plans", {"job_id": job["id"], "name": "Monday"})
     start = plan["horizon"]["start"]
@@ -154,7 +154,7 @@ def screens(browser: Browser, addresses: dict[str, tuple[str, str]]) -> None:
     browser.run("window.print = () => {}")
     browser.click("#print-passes")
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    # A sheet of A4 at 96 dots an inch, between its margins.
+    # A4 at 96 dots per inch, between the margins.
     take(browser, "screens/passes-print", 1030, width=703)
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
 

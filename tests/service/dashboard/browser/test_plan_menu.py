@@ -1,4 +1,4 @@
-"""A plan is worked on by clicks, and by keys alone: what is gathered is what is asked for."""
+"""Working on a plan by clicks, and by keys alone: the collected wishes are what is requested."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def places(api: httpx.Client, plan: Json) -> list[Json]:
 
 
 def asked(api: httpx.Client, plan: Json) -> Json:
-    """Return the question that a plan answers, with everything in it."""
+    """Return the scenario of a plan, expanded."""
     scenario_id = api.get(f"/v1/jobs/{plan['job_id']}").json()["scenario"]["id"]
     file: Json = api.get(f"/v1/scenarios/{scenario_id}?expand=true").json()
     return file
@@ -83,7 +83,7 @@ def choose_in_table(browser: Browser, table: int, text: str, offer: str) -> None
 
 
 def proposal(browser: Browser, api: httpx.Client, plan: Json, ask: Callable[[], object]) -> Json:
-    """Ask for the replan; return the draft that is proposed."""
+    """Request the replan; return the proposed draft."""
     ask()
     browser.wait(lambda: browser.text("#proposal-changes"), "no proposal")
     drafts = api.get("/v1/plans", params={"state": "draft", "limit": "500"}).json()["items"]
@@ -92,7 +92,7 @@ def proposal(browser: Browser, api: httpx.Client, plan: Json, ask: Callable[[], 
 
 
 def alone_on_the_map(targets: list[Json], width: float) -> Json:
-    """Return a target without image that no other one is near to, by the pixels of the map."""
+    """Return a target without image that is far from all others, in pixels of the map."""
     scale = width / 360
 
     def is_near(one: Json, other: Json) -> bool:
@@ -119,7 +119,7 @@ def test_a_plan_is_worked_on_by_clicks(browser: Browser, api: httpx.Client, plan
     choose_in_table(browser, 0, promised["target_id"], "promise")
     choose_in_table(browser, 1, contacts[0]["id"], "keep")
 
-    # What contradicts a line takes its place; a line that is removed is gone.
+    # A contradicting wish replaces a line; a removed line is gone.
     before = browser.text("#wishes")
     choose_in_table(browser, 1, promised["id"], "drop")
     assert f"Promised: {promised['target_id']}" not in browser.text("#wishes")
@@ -224,5 +224,5 @@ def test_a_plan_is_worked_on_by_keys_alone(browser: Browser, api: httpx.Client, 
     press(Keys.ENTER)
     browser.wait(lambda: "withdrawn" in browser.text("#replan-progress"), "it is not withdrawn")
     assert api.get(f"/v1/plans/{next_plan['id']}").json()["state"] == "withdrawn"
-    # What was gathered is still there, to be asked for otherwise.
+    # The wishes are still there, to be requested differently.
     assert skipped["target_id"] in browser.text("#wishes")
