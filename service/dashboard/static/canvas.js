@@ -27,7 +27,7 @@ export class Canvas {
   constructor(host, label, draw) {
     this.element = h("canvas", { tabindex: 0, role: "img", "aria-label": label });
     const pen = this.element.getContext("2d");
-    if (pen === null) throw new Error("This browser has no canvas.");
+    if (pen === null) throw new Error("This browser does not support canvases.");
     this.pen = pen;
     this.draw = draw;
     this.colors = readColors();

@@ -9,10 +9,10 @@ import { percent, targetTitle, utc } from "./format.js";
 
 /** @type {Record<string, string>} */
 const CAUSES = {
-  lost: "lost by an outage, a failure or a dropped target",
-  displaced_by: "its time was taken",
-  resource: "for battery, recorder or a contact",
-  gain: "for what it earns",
+  lost: "lost to an outage, a failure or a dropped target",
+  displaced_by: "another action took its time",
+  resource: "because of battery, recorder or a contact",
+  gain: "because of what it earns",
 };
 
 /**
@@ -22,8 +22,8 @@ const CAUSES = {
 export function changesTable(changes) {
   const { items } = changes;
   const shares =
-    `${percent(changes.changed_share)} of the plan after ${utc(changes.freeze_until)} UTC moved or removed, ` +
-    `${percent(changes.forced_share)} lost in any case.`;
+    `${percent(changes.changed_share)} of the plan after ${utc(changes.freeze_until)} UTC moved or removed; ` +
+    `${percent(changes.forced_share)} would be lost in any case.`;
   if (items.length === 0) return [h("p", {}, "Nothing changes.")];
   const rows = items.map((item) => {
     const about = /** @type {PlanActionOut} */ (item.action ?? item.parent_action);

@@ -104,7 +104,7 @@ function knotsIn(text) {
   const parts = text.split(",").filter((one) => one.trim() !== "");
   const knots = parts.map((one) => one.split(":").map(Number));
   if (!knots.every((one) => one.length === 2 && one.every(Number.isFinite))) {
-    throw new Error(`${text}: give pairs with a colon, between commas, as in 5: 150, 90: 600.`);
+    throw new Error(`${text}: write pairs with a colon, separated by commas, such as 5: 150, 90: 600.`);
   }
   return knots;
 }

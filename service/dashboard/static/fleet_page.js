@@ -74,7 +74,7 @@ function installForms() {
     if (open === null) return;
     const changes = changesIn(open.thing, open.fields);
     if (Object.keys(changes).length === 0) {
-      byId("edit-status").textContent = "Nothing is different.";
+      byId("edit-status").textContent = "Nothing to save.";
       return;
     }
     // Whoever was quicker is not overwritten.
@@ -96,7 +96,7 @@ function installForms() {
     field("thing").value = option.value;
     field("type-name").value = "";
     await Promise.all([fillSpacecraft(/** @type {HTMLSelectElement} */ (byId("type-base"))), edit()]);
-    byId("edit-status").textContent = "Added: change what is different.";
+    byId("edit-status").textContent = "Added: now change its figures.";
   });
   onSubmit("outage-form", "outage-error", async () => {
     const of = field("outage-of").value;

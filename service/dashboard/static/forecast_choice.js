@@ -51,7 +51,7 @@ async function take(input) {
     const one = await send(file);
     await refresh(one.id);
     const what = one.num_targets === null ? `A grid of ${one.num_values} values` : `${one.num_values} values of ${one.num_targets} targets`;
-    const told = [`${what} taken, ${spanOf(one)}.`, ...one.notes].join(" ");
+    const told = [`${what} accepted, ${spanOf(one)}.`, ...one.notes].join(" ");
     fill(outcome, h("div", { class: "notice good" }, h("div", {}, told)));
   } catch (error) {
     fill(outcome, h("div", { class: "notice bad", role: "alert" }, h("div", {}, ...describe(error))));
@@ -70,7 +70,7 @@ function send(file) {
   const ending = (parts.length > 1 ? parts.pop() : "") ?? "";
   const query = new URLSearchParams({ name: parts.join(".") || "Forecast" });
   const otherwise = /** @type {HTMLInputElement} */ (byId("forecast-otherwise"));
-  if (!otherwise.checkValidity()) throw new Error(`Clear sky elsewhere: ${otherwise.validationMessage}`);
+  if (!otherwise.checkValidity()) throw new Error(`Clear-sky probability: ${otherwise.validationMessage}`);
   if (otherwise.value !== "") query.set("default_clear_probability", otherwise.value);
   const mediaType = NETCDF.has(ending.toLowerCase()) ? "application/netcdf" : "text/csv";
   return upload(`/v1/forecasts?${query}`, file, mediaType);

@@ -8,7 +8,7 @@
 export function instantOf(text) {
   const plain = text.trim().replace(" UTC", "").replace(" ", "T").replace(/Z$/, "");
   const at = Date.parse(`${plain}Z`);
-  if (Number.isNaN(at)) throw new Error(`"${text}" is no time: write it as 2026-03-01 12:00:00.`);
+  if (Number.isNaN(at)) throw new Error(`"${text}" is not a time: write it as 2026-03-01 12:00:00.`);
   return new Date(at).toISOString();
 }
 

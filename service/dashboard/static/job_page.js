@@ -199,7 +199,7 @@ function installUnused(plan, job, gantt) {
     status.textContent = "";
     if (!value) return;
     const tell = (/** @type {number} */ count) => {
-      status.textContent = `${count} read`;
+      status.textContent = `${count} loaded`;
     };
     const { items, isAll } = await opportunitiesOf(job.scenario.id, { satellite_id: value }, tell);
     if (choice.value !== value) return;

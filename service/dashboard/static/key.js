@@ -70,7 +70,7 @@ export function installKeyDialog() {
     location.reload();
   });
   byId("key-button").addEventListener("click", () => {
-    askForKey("Another key for this tab.").then(
+    askForKey("Use another key in this tab.").then(
       () => location.reload(),
       () => {},
     );
@@ -89,8 +89,8 @@ export function showCaller(me, cameByLink) {
   if (cameByLink && me.scope !== "read") {
     notice(
       "warn",
-      `This link carries a key of the scope ${me.scope}: who has the link can change things. `,
-      "For a wall display make one with --scope read.",
+      `This link contains a key with scope ${me.scope}: anyone who has the link can change things. `,
+      "For a wall display, create a key with --scope read.",
     );
   }
 }

@@ -13,17 +13,17 @@ import { PagedTable } from "./table.js";
 
 /** @type {Record<string, string>} */
 const MEANINGS = {
-  no_access: "no satellite can take them in this horizon",
+  no_access: "no satellite can image them within this horizon",
   excluded: "the request itself rules them out",
-  outage: "what could take them is out then",
-  slew_conflict: "no time to turn between them and what is planned",
-  displaced_by: "what is planned instead earns as much or more",
+  outage: "outages take all their opportunities",
+  slew_conflict: "not enough time to slew between them and the planned actions",
+  displaced_by: "the planned actions in their place earn as much or more",
   battery: "the battery would fall below its limit",
   recorder: "the recorder would rise above its limit",
-  not_considered: "the search did not look at them",
-  not_delivered: "it could be taken, but would not come down in time",
-  solver_limit: "there is room, but the solver did not find it",
-  duplicate: "taken already",
+  not_considered: "the search did not consider them",
+  not_delivered: "they could be imaged, but not downlinked in time",
+  solver_limit: "there is room for them, but the solver did not find it",
+  duplicate: "already imaged",
 };
 
 /**

@@ -64,7 +64,7 @@ function suggestStart() {
   input("horizon-start").value = utc(start);
   byId("horizon-about").textContent = isFresh
     ? "The next full hour."
-    : "Near the epoch of the newest orbit chosen.";
+    : "Near the epoch of the newest chosen orbit.";
 }
 
 async function showScenarios() {
@@ -123,8 +123,8 @@ async function scenarioId() {
   if (chosen.target_catalog_ids.length === 0) throw new Error("Choose or upload at least one target catalogue.");
   const start = instantOf(input("horizon-start").value);
   const length = Number(input("horizon-hours").value) * HOUR_MS;
-  if (!Number.isFinite(start)) throw new Error("Start: give it as 2026-03-01 00:00:00, in UTC.");
-  if (!(length > 0)) throw new Error("Length: give a number of hours.");
+  if (!Number.isFinite(start)) throw new Error("Start: write it as 2026-03-01 00:00:00, in UTC.");
+  if (!(length > 0)) throw new Error("Length: enter a number of hours.");
   /** @type {ScenarioOut} */
   const made = await post("/v1/scenarios", {
     name: input("scenario-name").value.trim() || null,
@@ -152,7 +152,7 @@ function instantOf(text) {
 function spacing() {
   const text = input("collect-spacing").value.trim();
   if (text === "") return null;
-  if (!(Number(text) > 0)) throw new Error("Collects of an access: give a number of seconds, or nothing.");
+  if (!(Number(text) > 0)) throw new Error("Seconds between collect starts: enter a positive number, or nothing.");
   return Number(text);
 }
 

@@ -148,7 +148,7 @@ function pin(plan, kind, text, told, { id, target_id, station_id, start, end }, 
  * @returns {Offer}
  */
 function promise(plan, id) {
-  const text = `Promised: ${plan.targetTitle(id)} is imaged.`;
+  const text = `Promised: ${plan.targetTitle(id)} will be imaged.`;
   return { id: "promise", text: "Promise its image", wish: { text, kind: "promise", value: id, stances: { [`target ${id}`]: "wanted" } } };
 }
 

@@ -75,7 +75,7 @@ async function show(plan, path) {
     byId("passes-caption"),
     `${plan.name ?? "Plan"} (${plan.state}): ${items.length} passes, ${planned} planned, ` +
       `${utc(wanted.get("from"))} to ${utc(wanted.get("to"))} UTC`,
-    isLong && h("span", { class: "on-paper" }, "; here are the planned ones"),
+    isLong && h("span", { class: "on-paper" }, "; only the planned ones are printed"),
   );
   const body = byId("passes").querySelector("tbody");
   if (body) fill(body, ...items.map(rowOf));

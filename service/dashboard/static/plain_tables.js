@@ -145,7 +145,7 @@ function targetFilter(plan, table) {
   return h(
     "div",
     { class: "row tools" },
-    h("label", {}, "Target with ", find),
+    h("label", {}, "Name or id ", find),
     h("label", {}, "Outcome ", outcome),
     h("label", {}, "Reason ", reason),
     count,

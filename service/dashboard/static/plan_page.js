@@ -80,7 +80,7 @@ function showLife(plan, freezeUntil) {
     byId("plan-about"),
     `${utc(plan.horizon.start)} to ${utcLabelled(plan.horizon.end)}, `,
     h("a", { href: `/jobs/${plan.job_id}` }, "its job"),
-    plan.parent_id && ", changes ",
+    plan.parent_id && ", replan of ",
     plan.parent_id && h("a", { href: `/plans/${plan.parent_id}` }, short(plan.parent_id)),
   );
   byId("violations-card").hidden = plan.violations.length === 0;

@@ -19,7 +19,7 @@ export function move(plan, to, reason, effectiveFrom) {
   if (reason) body.reason = reason;
   if (effectiveFrom) body.effective_from = effectiveFrom;
   if (to === "approved" && plan.violations.length > 0) {
-    if (!reason) throw new Error("Say why the plan may break its limits.");
+    if (!reason) throw new Error("Enter a reason why this plan may break limits.");
     body.waivers = plan.violations.map((_, i) => ({ violation: `/violations/${i}`, reason }));
   }
   return post(`/v1/plans/${encodeURIComponent(plan.id)}/transitions`, body);

@@ -80,7 +80,7 @@ function installOutages(plan, stations, wishes) {
       const end = new Date(Date.parse(start) + Number(field("outage-hours").value) * HOUR_MS).toISOString();
       const name = /** @type {HTMLSelectElement} */ (/** @type {unknown} */ (choice)).selectedOptions[0]?.text;
       wishes.add({
-        text: `Out: ${name}, ${utc(start)} to ${utc(end)} UTC.`,
+        text: `Outage: ${name}, ${utc(start)} to ${utc(end)} UTC.`,
         kind: "outage",
         value: { [choice.value.slice(0, at)]: choice.value.slice(at + 1), start, end },
       });
@@ -113,6 +113,6 @@ async function propose(plan, wishes) {
     last = told;
     progress.show(told, `Replan: ${told.state}${told.progress ? `, ${told.progress.phase}` : ""}`);
   });
-  if (last.state !== "succeeded") throw new Error(last.error?.detail ?? `The replan ended as ${last.state}.`);
+  if (last.state !== "succeeded") throw new Error(last.error?.detail ?? `The replan ended in state ${last.state}.`);
   return get(job.links.plan ?? "");
 }

@@ -45,7 +45,7 @@ export async function installSatelliteForm(onStored) {
   byId("satellite-form").append(
     field("one-name", "Name", name),
     field("one-tle", "TLE: line 1 and line 2", tle),
-    field("one-type", "Spacecraft: its figures hold where nothing is entered", type),
+    field("one-type", "Spacecraft type: its figures apply to empty fields", type),
     h("h3", {}, "Agility"),
     agility.element,
     h("h3", {}, "Sensor"),
@@ -73,7 +73,7 @@ function field(id, text, input) {
  */
 function withoutDefaults(schema) {
   const named = Object.entries(schema.properties ?? {});
-  const properties = named.map(([name, one]) => [name, { ...one, default: "the type's" }]);
+  const properties = named.map(([name, one]) => [name, { ...one, default: "from the type" }]);
   return { ...schema, properties: Object.fromEntries(properties) };
 }
 

@@ -76,7 +76,7 @@ export function watchSelection(plan, selection, job, gantt, desk) {
  * @param {() => boolean} isWanted
  */
 async function offerAccess(plan, job, targetId, desk, place, isWanted) {
-  const hint = h("p", { class: "hint" }, "Looking for what would give it an access …");
+  const hint = h("p", { class: "hint" }, "Searching for changes that would give it an access …");
   place.append(hint);
   const told = await explanationOf(job.id, targetId, isWanted);
   hint.remove();
@@ -138,7 +138,7 @@ function reasonFacts(plan, selection, reason) {
   const facts = [["Certainty", reason.certainty]];
   if (reason.at !== null) facts.push(["At", utcLabelled(reason.at)]);
   if (reason.blocking_actions.length > 0) facts.push(["Blocked by", blockersOf(plan, selection, reason)]);
-  if (reason.change !== null) facts.push(["Would be in with", changeOf(plan, reason.change)]);
+  if (reason.change !== null) facts.push(["Would let it in", changeOf(plan, reason.change)]);
   return facts;
 }
 
@@ -186,7 +186,7 @@ function tellOpportunities(plan, targetId, items, place) {
     ),
   );
   const heads = ["", "Satellite", "Start (UTC)", "End (UTC)", "Off nadir, °", "Sun, °", "Light"];
-  const caption = `Opportunities of ${plan.targetTitle(targetId)}: ${items.length}${items.length > 100 ? ", the first 100" : ""}`;
+  const caption = `Opportunities of ${plan.targetTitle(targetId)}: ${items.length}${items.length > 100 ? ", the first 100 shown" : ""}`;
   fill(
     place,
     h(

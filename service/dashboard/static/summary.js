@@ -50,7 +50,7 @@ function showWarnings(warnings) {
 function downOf(totals) {
   if (totals.downlinked_mbit !== null) return `${number(totals.downlinked_mbit, 0)} Mbit down`;
   if (totals.downlinked_fraction === null) return "";
-  return `downlinked ${number(totals.downlinked_fraction, 2)} times what the recorder holds`;
+  return `${number(totals.downlinked_fraction, 2)} times the recorder's capacity downlinked`;
 }
 
 /**

@@ -59,7 +59,7 @@ async function read() {
   if (catalog !== field("catalog").value || state !== field("state").value) return;
   etag = response.headers.get("ETag") ?? "";
   lives = /** @type {TargetLifeOut[]} */ (found.items);
-  byId("priorities-status").textContent = found.isAll ? "" : `These are the first ${lives.length}.`;
+  byId("priorities-status").textContent = found.isAll ? "" : `Only the first ${lives.length} are shown.`;
   narrow();
 }
 
@@ -73,7 +73,7 @@ function narrow() {
 /** @returns {PagedTable<TargetLifeOut>} */
 function tableOf() {
   return new PagedTable(
-    "Targets, and the image that each state rests on",
+    "Targets, and the image that each state is based on",
     [
       { title: "Target", cell: ({ target }) => targetTitle(target.id, target.name) },
       { title: "State", cell: ({ state }) => state },
@@ -105,7 +105,7 @@ function priorityOf(target) {
 async function save() {
   const count = edited.size;
   if (count === 0) {
-    byId("priorities-status").textContent = "Nothing is different.";
+    byId("priorities-status").textContent = "Nothing to save.";
     return;
   }
   const body = JSON.stringify({ rewards: Object.fromEntries(edited) });

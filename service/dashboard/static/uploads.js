@@ -68,7 +68,7 @@ export class Choices {
       return h("label", {}, box, ` ${this.titleOf(thing)}`);
     });
     const all = h("button", { type: "button", class: "quiet", onclick: () => this.tickAll(isAll) }, "All or none");
-    const note = isAll ? null : h("small", {}, `The newest ${boxes.length} of those stored.`);
+    const note = isAll ? null : h("small", {}, `Only the newest ${boxes.length} are listed.`);
     fill(this.place(".choices"), boxes.length > 0 ? all : "None stored yet.", ...boxes, note);
   }
 
@@ -117,7 +117,7 @@ const MEANT_AS_REWARD = new Set(["priority", "weight", "value", "score", "import
  */
 function told(answer, noun) {
   /** @type {(HTMLElement | string)[]} */
-  const parts = [`${counted(answer.accepted, noun)} taken, ${answer.rejected} refused.`];
+  const parts = [`${counted(answer.accepted, noun)} accepted, ${answer.rejected} rejected.`];
   const lines = answer.errors.slice(0, 20).map((error) =>
     h("li", {}, `${error.row === null ? "" : `Line ${error.row}: `}${error.detail}`),
   );
@@ -147,7 +147,7 @@ async function sendSatellites(file) {
   const ids = answer.items.map((/** @type {{id: string}} */ item) => item.id);
   const parts = told(answer, "satellite");
   const named = type.selectedOptions[0]?.textContent ?? "generic_optical";
-  parts.push(` New ones have the figures of the type ${named}: change them under Fleet.`);
+  parts.push(` New satellites have the figures of the type ${named}: change them under Fleet.`);
   return { told: parts, ids };
 }
 
@@ -169,9 +169,9 @@ async function sendTargets(file) {
   const ignored = answer.ignored_columns;
   const meansReward = ignored.some((/** @type {string} */ name) => MEANT_AS_REWARD.has(name.toLowerCase()));
   const parts = [
-    `${counted(answer.num_targets, "target")} taken.`,
+    `${counted(answer.num_targets, "target")} accepted.`,
     ignored.length > 0 && ` Not used: ${ignored.join(", ")}.`,
-    meansReward && " How much an image counts is read from the column reward.",
+    meansReward && " What an image earns is read from the column reward.",
   ].filter((part) => part !== false);
   return { told: parts, ids: [answer.id] };
 }
@@ -204,7 +204,7 @@ export function allChoices() {
       "stations",
       "/v1/ground-stations",
       (/** @type {import("./types.js").GroundStationOut} */ one) =>
-        `${one.name} (${one.lat_deg.toFixed(2)}, ${one.lon_deg.toFixed(2)}), above ${one.min_elevation_deg}°`,
+        `${one.name} (${one.lat_deg.toFixed(2)}, ${one.lon_deg.toFixed(2)}), elevation from ${one.min_elevation_deg}°`,
       sendStations,
     ),
   };

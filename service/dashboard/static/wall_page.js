@@ -43,7 +43,7 @@ startPage(async () => {
       await refresh(map);
       tell("");
     } catch (error) {
-      tell(`No answer since ${utc(Date.now())} UTC; asking again.`);
+      tell(`No answer since ${utc(Date.now())} UTC; retrying.`);
     }
     await pause(EVERY_MS);
   }

@@ -50,7 +50,7 @@ async function tried(job, change, place) {
     varied = now;
     progress.show(now, `What if: ${now.state}${now.progress ? `, ${now.progress.phase}` : ""}`);
   });
-  if (varied.state !== "succeeded") throw new Error(varied.error?.detail ?? `The search ended as ${varied.state}.`);
+  if (varied.state !== "succeeded") throw new Error(varied.error?.detail ?? `The search ended in state ${varied.state}.`);
   return { varied, diff: await get(`${path}/diff/${encodeURIComponent(varied.id)}`) };
 }
 
@@ -67,12 +67,12 @@ function told(text, job, diff) {
   ];
   const heads = ["Change", "Target or station", "Satellite", "Is (UTC)", "Would be (UTC)"];
   const head = h("tr", {}, ...heads.map((title) => h("th", { scope: "col" }, title)));
-  const more = rows.length > MOST_ROWS ? `, the first ${MOST_ROWS}` : "";
+  const more = rows.length > MOST_ROWS ? `, the first ${MOST_ROWS} shown` : "";
   const caption = h("caption", {}, `${rows.length} changes${more}`);
   const reward = diff.totals.reward;
   return [
     h("p", { class: "hint" }, text),
-    h("p", { class: "what-if-outcome" }, reward ? `Reward ${number(reward.before)} → ${number(reward.after)}. ` : "The reward stays as it is. ",
+    h("p", { class: "what-if-outcome" }, reward ? `Reward ${number(reward.before)} → ${number(reward.after)}. ` : "The reward does not change. ",
       h("a", { href: `/jobs/${encodeURIComponent(job.id)}` }, "Open that plan")),
     rows.length > 0 &&
       h("div", { class: "scroll changes", tabindex: 0, role: "region", "aria-label": "What would change" },

@@ -66,7 +66,7 @@ class Walk:
             time.sleep(AIM_S + CHOOSE_FILE_S)
             self.browser.find(f"#{kind}-file").send_keys(str(file.resolve()))
             outcome = f"#{kind} .outcome"
-            self.browser.wait(lambda: "taken" in self.browser.text(outcome), f"no {kind}")
+            self.browser.wait(lambda: "accepted" in self.browser.text(outcome), f"no {kind}")
         print(f"          {self.browser.text(outcome)}")
 
 

@@ -37,7 +37,7 @@ def test_a_plan_goes_by_the_forecast_that_is_uploaded(
     lines = [f"{name},{at},{CLEAR[name]}" for name in CLEAR for at in times]
     file = files / "skies.csv"
     file.write_text("\n".join(["target_id,time,clear_probability", *lines]), encoding="utf-8")
-    assert "4 values of 2 targets taken, 2026-02-28" in take(browser, file)
+    assert "4 values of 2 targets accepted, 2026-02-28" in take(browser, file)
     (stored,) = api.get("/v1/forecasts").json()["items"]
     assert stored["name"] == "skies"
     assert browser.find("#forecast-choice").get_attribute("value") == stored["id"]
@@ -66,7 +66,7 @@ def test_netcdf_is_taken_and_what_it_leaves_out_counts_as_told(
     (stored,) = api.get("/v1/forecasts").json()["items"]
     assert (stored["name"], stored["default_clear_probability"]) == ("europe", 0.5)
     assert stored["kind"] == "grid"
-    assert f"A grid of {stored['num_values']} values taken" in said
+    assert f"A grid of {stored['num_values']} values accepted" in said
     assert all(note in said for note in stored["notes"])
     api.delete(f"/v1/forecasts/{stored['id']}").raise_for_status()
 

@@ -25,12 +25,12 @@ def fill_in(browser: Browser, files: Path) -> None:
     browser.open("/new")
     browser.wait(lambda: browser.text("#params") is not None and browser.text("#solver-about"))
     upload(browser, "satellites", files / "eye.tle", "\n".join(["EYE", *tle(90200)]))
-    assert "1 satellite taken, 0 refused" in browser.text("#satellites .outcome")
+    assert "1 satellite accepted, 0 rejected" in browser.text("#satellites .outcome")
     rows = [f"{name},{lat},{lon},{number}" for number, (name, lat, lon) in enumerate(TARGETS, 1)]
     upload(browser, "targets", files / "towns.csv", "\n".join(["id,lat_deg,lon_deg,reward", *rows]))
-    assert "4 targets taken" in browser.text("#targets .outcome")
+    assert "4 targets accepted" in browser.text("#targets .outcome")
     upload(browser, "stations", files / "s.csv", "name,lat_deg,lon_deg\nSvalbard,78.23,15.39\n")
-    assert "1 station taken" in browser.text("#stations .outcome")
+    assert "1 station accepted" in browser.text("#stations .outcome")
 
 
 def test_from_files_to_a_timeline_in_the_browser_alone(

@@ -188,7 +188,7 @@ def test_a_priority_column_is_spoken_of(browser: Browser, tmp_path: Path) -> Non
     browser.open("/new")
     browser.wait(lambda: browser.text("#solver-about"))
     browser.find("#targets-file").send_keys(str(file))
-    browser.wait(lambda: "1 target taken." in browser.text("#targets .outcome"), "not taken")
+    browser.wait(lambda: "1 target accepted." in browser.text("#targets .outcome"), "no answer")
     assert "Not used: priority." in browser.text("#targets .outcome")
     assert "column reward" in browser.text("#targets .outcome")
 

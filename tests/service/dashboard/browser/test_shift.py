@@ -178,7 +178,7 @@ def test_a_station_is_changed_and_reported_as_out(
     browser.wait(lambda: browser.text("#edit-status") == "Saved.", "it is not saved")
     assert api.get(address).json() == station | {"min_elevation_deg": 12.5}
     browser.click("#edit-form button")
-    browser.wait(lambda: browser.text("#edit-status") == "Nothing is different.", "it changed")
+    browser.wait(lambda: browser.text("#edit-status") == "Nothing to save.", "it changed")
     browser.run(
         "document.querySelector('#outage-of').value = arguments[0]", f"station_id {station['id']}"
     )
