@@ -1,5 +1,5 @@
 // @ts-check
-/** What can be done with what is selected: actions are reported, wishes of the next plan are made. */
+/** What can be done with the selected item: actions are reported, wishes for the next replan are made. */
 
 import { list, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -21,7 +21,7 @@ export class ActionDesk {
     this.path = `/v1/plans/${encodeURIComponent(plan.id)}`;
     this.drawn = drawn;
     this.selection = selection;
-    // Nobody goes on from a plan that is withdrawn or superseded.
+    // A withdrawn or superseded plan is not replanned.
     this.desk = new WishDesk(drawn, selection, wishes, () => !byId("replan-card").hidden);
     /** @type {Map<string, PlanActionOut>} */
     this.actions = new Map();
@@ -68,7 +68,7 @@ export class ActionDesk {
     );
   }
 
-  /** Whether there is anything to report of: the plan is flown, or was. */
+  /** Whether actions can be reported: the plan is being flown, or was. */
   isReported() {
     return this.plan.state !== "draft" && this.plan.state !== "approved";
   }

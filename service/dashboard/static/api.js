@@ -22,7 +22,7 @@ export class Problem extends Error {
 }
 
 /**
- * Send a request; where a key is needed, ask for one and send it again.
+ * Send a request; if a key is needed, ask for one and send it again.
  * @param {string} path
  * @param {RequestInit & {headers?: Record<string, string>}} [options]
  * @returns {Promise<Response>}
@@ -80,7 +80,7 @@ export async function upload(path, content, mediaType) {
  * @template T
  * @param {string} path
  * @param {number} [most]
- * @param {(items: T[]) => void} [onPage] told after each page what there is so far
+ * @param {(items: T[]) => void} [onPage] called after each page with all items so far
  * @returns {Promise<{items: T[], isAll: boolean}>}
  */
 export async function list(path, most = Infinity, onPage = () => {}) {
@@ -102,7 +102,7 @@ export async function list(path, most = Infinity, onPage = () => {}) {
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "expired"]);
 
 /**
- * Tell of a job as it is and at each change, until it is final.
+ * Report a job now and at each change, until it is final.
  * @param {string} jobId
  * @param {(job: import("./types.js").JobOut) => void} onChange
  */
@@ -118,7 +118,7 @@ export async function follow(jobId, onChange) {
         cache: "no-store",
       });
     } catch (error) {
-      // A service that restarts is waited for; a refusal is not.
+      // Wait for a service that restarts, but not after a refusal.
       if (error instanceof Problem && error.status < 500) throw error;
       if (!(error instanceof Problem) && !(error instanceof TypeError)) throw error;
       await pause(2000);

@@ -1,5 +1,5 @@
 // @ts-check
-/** Buttons in tables that select, and open the menu of what they select where the page has one. */
+/** Buttons in tables that select an item, and open its menu if the page has one. */
 
 import { h } from "./dom.js";
 
@@ -8,7 +8,7 @@ import { h } from "./dom.js";
  * @param {import("./plan.js").Plan} plan
  * @param {import("./selection.js").Selection} selection
  * @param {string} id
- * @param {string} [text] its id where nothing else is said
+ * @param {string} [text] by default its id
  */
 export function actionButton(plan, selection, id, text = id) {
   return selecting(text, selection, () => plan.about(id));

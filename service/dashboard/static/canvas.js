@@ -1,5 +1,5 @@
 // @ts-check
-/** Canvases that follow their width, the screen's resolution and the colours of the page. */
+/** Canvases that adapt to their width, the screen's resolution and the colours of the page. */
 
 import { h } from "./dom.js";
 
@@ -17,11 +17,11 @@ function readColors() {
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
-/** A canvas that is drawn at most once a frame. */
+/** A canvas that is drawn at most once per frame. */
 export class Canvas {
   /**
    * @param {HTMLElement} host
-   * @param {string} label what the picture shows, for those who do not see it
+   * @param {string} label what the picture shows, for screen readers
    * @param {(pen: CanvasRenderingContext2D, width: number, height: number, colors: Colors) => void} draw
    */
   constructor(host, label, draw) {

@@ -16,7 +16,7 @@ const CAUSES = {
 };
 
 /**
- * Return the changes as elements: the shares, then a row for each.
+ * Return the changes as elements: the shares, then a row for each change.
  * @param {PlanChangesOut} changes
  */
 export function changesTable(changes) {

@@ -1,5 +1,5 @@
 // @ts-check
-/** Several solvers on one scenario, filling up as they finish. */
+/** Several solvers on one scenario, in a table that fills as they finish. */
 
 import { get, pause } from "./api.js";
 import { byId, fill, h } from "./dom.js";

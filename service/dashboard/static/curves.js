@@ -101,14 +101,14 @@ export class CurveChart {
     pen.fillStyle = colors.bad ?? "";
     pen.fillText(`${side} ${percent(what.limit)}`, MARGIN.left + 6, y(what.limit) + (what.isFloor ? 9 : -9));
     pen.fillStyle = colors.soft ?? "";
-    // At the right: at the left a high limit's own text may reach up to here.
+    // On the right, since the text of a high limit on the left may reach up to here.
     pen.textAlign = "right";
     pen.fillText(`${what.name}: ${extreme(time, values, what.isFloor)}`, width - MARGIN.right, top - 8);
     pen.textAlign = "left";
   }
 
   /**
-   * Draw a curve with at most its lowest and highest value a pixel.
+   * Draw a curve; within a column of pixels, values between those already drawn are skipped.
    * @param {CanvasRenderingContext2D} pen
    * @param {number} span
    * @param {Float64Array} time

@@ -1,5 +1,5 @@
 // @ts-check
-/** Elements made without markup in strings, which the page's policy forbids. */
+/** Makes elements without markup in strings, which the page's policy forbids. */
 
 /** @typedef {Node | string | number | null | undefined | false} Child */
 
@@ -9,7 +9,7 @@
  * @template {keyof HTMLElementTagNameMap} K
  * @param {K} tag
  * @param {Record<string, string | number | boolean | null | undefined | ((event: any) => void)>} [attributes]
- *   `on…` are listeners; true stands for an attribute without value; false and null for none.
+ *   `on…` are listeners; true stands for an attribute without value, false and null for no attribute.
  * @param {...Child} children
  * @returns {HTMLElementTagNameMap[K]}
  */
@@ -35,7 +35,7 @@ function append(parent, children) {
 }
 
 /**
- * Replace what an element holds.
+ * Replace an element's children.
  * @param {Element} parent
  * @param {...Child} children
  */
@@ -57,7 +57,7 @@ export function byId(id) {
 }
 
 /**
- * Tell the reader something at the top of the page.
+ * Show a message at the top of the page.
  * @param {"good" | "warn" | "bad"} kind
  * @param {...Child} text
  */
@@ -69,7 +69,7 @@ export function notice(kind, ...text) {
 }
 
 /**
- * Show numbers, with a bar for the eye.
+ * Return a progress bar.
  * @param {number} fraction
  * @param {string} label
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** Fields for all figures of a stored thing, and what was changed in them. */
+/** Form fields for all figures of a stored item, and the changes made in them. */
 
 import { h } from "./dom.js";
 
@@ -10,11 +10,11 @@ import { h } from "./dom.js";
  *   read: (text: string) => unknown}} Field
  */
 
-/** What no change can touch, or what has a call of its own. */
+/** What cannot be changed, or has a call of its own. */
 const FIXED = new Set(["id", "created_at", "updated_at", "norad_cat_id", "epoch", "tle", "omm", "oem", "links", "is_built_in", "spacecraft"]);
-/** What a change replaces as a whole. */
+/** What is only replaced as a whole. */
 const WHOLE = new Set(["resources"]);
-/** The part of the API's description that tells of each part of a thing. */
+/** The schema of the API that describes each part of an item. */
 const DESCRIBED_BY = { agility: "AgilityIn", sensor: "SensorIn", resources: "OwnResources", "": "GroundStationIn" };
 
 /** @type {Record<string, string>} */
@@ -26,7 +26,7 @@ const UNITS = [
 ];
 
 /**
- * Return a field for each figure; what is set can be changed but not unset.
+ * Return a field for each figure; a figure that is set can be changed but not removed.
  * @param {Thing} thing
  * @param {Record<string, Schema>} schemas of the API
  * @param {string[]} [within]
@@ -48,7 +48,7 @@ export function fieldsOf(thing, schemas, within = []) {
 /**
  * @param {unknown} value
  * @param {Schema} schema
- * @returns {Pick<Field, "input" | "read"> | null} null for what has no simple field
+ * @returns {Pick<Field, "input" | "read"> | null} null for values without a simple field
  */
 function inputFor(value, schema) {
   const options = schema.anyOf ?? [schema];
@@ -110,7 +110,7 @@ function knotsIn(text) {
 }
 
 /**
- * Return the fields part by part, under operators' words.
+ * Return the fields part by part, under headings in operators' words.
  * @param {Field[]} fields
  */
 export function grouped(fields) {
@@ -130,8 +130,8 @@ function labelled({ path, before, input }) {
 }
 
 /**
- * Return the name of a figure as people read it, with its unit.
- * @param {string} name as the API has it
+ * Return a readable name of a figure, with its unit.
+ * @param {string} name in the API
  */
 export function wordsOf(name) {
   const [ending, unit] = UNITS.find(([one]) => name.endsWith(one)) ?? ["", ""];
@@ -141,7 +141,7 @@ export function wordsOf(name) {
 }
 
 /**
- * Return what was changed, as a PATCH takes it.
+ * Return the changes, in the form of a PATCH body.
  * @param {Thing} thing
  * @param {Field[]} fields
  * @returns {Thing}

@@ -1,5 +1,5 @@
 // @ts-check
-/** Satellites, stations and spacecraft types as they are now, and what is out. */
+/** Satellites, stations and spacecraft types as they are now, and outages. */
 
 import { call, get, list, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -77,7 +77,7 @@ function installForms() {
       byId("edit-status").textContent = "Nothing to save.";
       return;
     }
-    // Whoever was quicker is not overwritten.
+    // Changes that somebody else made in the meantime are not overwritten.
     const headers = { "Content-Type": "application/json", "If-Match": open.etag };
     await call(field("thing").value, { method: "PATCH", headers, body: JSON.stringify(changes) });
     const name = changes.name;

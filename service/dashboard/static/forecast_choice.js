@@ -1,5 +1,5 @@
 // @ts-check
-/** Which forecast of clear skies a scenario takes along, and the upload of one. */
+/** The clear-sky forecast that a scenario includes, and the upload of one. */
 
 import { list, upload } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -11,7 +11,7 @@ import { describe } from "./page.js";
 const SHOWN = 500;
 const NETCDF = new Set(["nc", "nc4", "cdf", "netcdf", "h5"]);
 
-/** Fill the choice, and take files. */
+/** Fill the choice, and accept files. */
 export async function installForecasts() {
   const input = /** @type {HTMLInputElement} */ (byId("forecast-file"));
   input.addEventListener("change", () => take(input));
@@ -56,7 +56,7 @@ async function take(input) {
   } catch (error) {
     fill(outcome, h("div", { class: "notice bad", role: "alert" }, h("div", {}, ...describe(error))));
   } finally {
-    // So that the same file, mended, can be chosen again.
+    // So that the same file can be chosen again once it is corrected.
     input.value = "";
   }
 }

@@ -2,7 +2,7 @@
 /** Numbers and times as people read them. All times are UTC and say so. */
 
 /**
- * @param {number | string | null | undefined} at milliseconds, or as the API writes instants
+ * @param {number | string | null | undefined} at in milliseconds, or in the API's format
  * @returns {string} such as `2026-03-01 12:00:05`; the column or label says UTC
  */
 export function utc(at) {
@@ -41,7 +41,7 @@ export function duration(seconds) {
 }
 
 /**
- * Seconds between two instants; to now where the later one is missing.
+ * Seconds between two instants; until now if the later one is missing.
  * @param {string | null} from
  * @param {string | null} to
  */
@@ -51,7 +51,7 @@ export function secondsBetween(from, to) {
 }
 
 /**
- * Reward against bound, as the timeline defines the gap.
+ * The gap between reward and bound, as the timeline defines it.
  * @param {number | null | undefined} reward
  * @param {number | null | undefined} bound
  */
@@ -61,7 +61,7 @@ export function gapOf(reward, bound) {
 }
 
 /**
- * A target in texts: its name where it has one, and its id.
+ * A target in texts: its name if it has one, and its id.
  * @param {string} id
  * @param {string | null | undefined} name
  */
@@ -69,7 +69,7 @@ export function targetTitle(id, name) {
   return name && name !== id ? `${name} (${id})` : id;
 }
 
-/** A name for an id that has none: its last, random part. @param {string} id */
+/** A short name for an item without one: the last, random part of its id. @param {string} id */
 export function short(id) {
   return id.slice(-8);
 }

@@ -16,7 +16,7 @@ export const MARGIN = { left: 120, right: 12 };
 const AXIS = 24;
 const REACH_PX = 4;
 
-/** Of more rows the lower axis may be out of sight: they have another one above. */
+/** With more rows the lower axis may be off the screen: there is a second one above. */
 const FEW_ROWS = 8;
 
 /** @typedef {Record<"collects" | "slews" | "opportunities" | "contacts" | "sunpoints", [number, number]>} Lanes */
@@ -34,7 +34,7 @@ const LANES = {
 };
 
 /**
- * The same of plans that only take images.
+ * The same for plans that only take images.
  * @type {Lanes}
  */
 const IMAGING_LANES = { ...LANES, collects: [0.1, 0.6], slews: [0.24, 0.46], opportunities: [0.68, 0.9] };
@@ -69,7 +69,7 @@ export class Gantt {
     host.append(this.tip);
     view.onChange(() => this.canvas.redraw());
     selection.onChange(() => this.canvas.redraw());
-    setInterval(() => this.canvas.redraw(), 30_000); // the line of now moves
+    setInterval(() => this.canvas.redraw(), 30_000); // the line that marks now moves
     const element = this.canvas.element;
     takeTimeInput(element, view, MARGIN, (x, y) => this.click(x, y));
     element.addEventListener("pointermove", (event) => this.hover(event.offsetX, event.offsetY));
@@ -84,7 +84,7 @@ export class Gantt {
   }
 
   /**
-   * Select the action after the selected one, or before it; where none is in sight, the first one that is.
+   * Select the action after or before the selected one, or the first visible action if that one is not visible.
    * @param {1 | -1} by
    */
   step(by) {
@@ -128,7 +128,7 @@ export class Gantt {
       pen.fillRect(0, top + this.rowHeight() - 1, width, 1);
     });
     drawNow(pen, view, width, bottom, colors);
-    // Tests and the curious see that work goes with pixels, not with actions.
+    // Tests check that the work depends on pixels, not on the number of actions.
     this.canvas.element.dataset.bars = String(numBars);
   }
 
@@ -168,7 +168,7 @@ export class Gantt {
   }
 
   /**
-   * Return the row under a point, the instant there, and how far a pointer reaches.
+   * Return the row under a point, the instant, the pointer's reach in milliseconds, and how far down the row (0 to 1).
    * @param {number} x
    * @param {number} y
    */
@@ -210,7 +210,7 @@ export class Gantt {
   }
 
   /**
-   * Open the menu of the selected action where it lies.
+   * Open the menu of the selected action at its position.
    * @param {KeyboardEvent} event
    */
   openByKey(event) {
@@ -244,7 +244,7 @@ export class Gantt {
   }
 }
 
-/** Draws spans as bars: what falls on pixels that are painted already is passed over. */
+/** Draws spans as bars; skips those on pixels that are painted already. */
 class LanePainter {
   /**
    * @param {CanvasRenderingContext2D} pen
@@ -275,7 +275,7 @@ class LanePainter {
       const start = /** @type {number} */ (lane.start[i]);
       if (start > this.view.end) break;
       const end = Math.max(/** @type {number} */ (lane.end[i]), start + onePixel);
-      // A gap narrower than the eye sees in a bar is kept open by half a pixel.
+      // Half a pixel less than the span, so that narrow gaps stay visible.
       this.pen.fillRect(this.x(start), top, Math.max((end - start) * this.scale - 0.5, 1), height);
       this.numBars += 1;
       i = Math.max(i + 1, end - start <= onePixel ? lane.firstPast(end) : i + 1);
@@ -315,7 +315,7 @@ class LanePainter {
  * @param {number} width
  * @param {number} bottom where the plot ends
  * @param {import("./canvas.js").Colors} colors
- * @param {number} [top] room for the instants above the plot too
+ * @param {number} [top] height above the plot for instants there too; 0 for none
  */
 export function drawAxis(pen, view, width, bottom, colors, top = 0) {
   const span = width - MARGIN.left - MARGIN.right;

@@ -1,5 +1,5 @@
 // @ts-check
-/** What the map shows: land, and the timeline as GeoJSON, made ready for drawing. */
+/** What the map shows: land, and the timeline as GeoJSON, prepared for drawing. */
 
 import { call } from "./api.js";
 import { targetTitle } from "./format.js";
@@ -16,12 +16,12 @@ import { firstAbove } from "./plan.js";
 /**
  * @typedef {object} TargetPlace
  * @property {string} id
- * @property {string} name for pictures; the id where it has none
- * @property {string} title for texts: its name, and its id
+ * @property {string} name for pictures; the id if it has none
+ * @property {string} title for texts: its name and its id
  * @property {number} lon
  * @property {number} lat
  * @property {string} outcome
- * @property {string | null} reason code of the reason why it is left out
+ * @property {string | null} reason code of the reason if it is left out
  * @property {string | null} why
  * @property {string | null} actionId
  * @property {string | null} satelliteId

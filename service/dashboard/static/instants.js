@@ -1,8 +1,8 @@
 // @ts-check
-/** Instants that people type: UTC, as the pages show them. */
+/** Instants as people type them: in UTC, as the pages show them. */
 
 /**
- * Return an instant as the API takes it.
+ * Return an instant in the API's format.
  * @param {string} text such as `2026-03-01 12:00:05`, with or without `T` and `Z`
  */
 export function instantOf(text) {
@@ -13,15 +13,15 @@ export function instantOf(text) {
 }
 
 /**
- * Return the hour and minute, with seconds.
- * @param {string} at as the API writes it
+ * Return the time of day, to the second.
+ * @param {string} at in the API's format
  */
 export function clockOf(at) {
   return at.slice(11, 19);
 }
 
 /**
- * Return a time to go, or gone by, as people count it down.
+ * Return a remaining or elapsed time as hours, minutes and seconds.
  * @param {number} ms
  */
 export function countdown(ms) {

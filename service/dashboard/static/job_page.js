@@ -43,12 +43,12 @@ startPage(async () => {
     if (!byId("progress-card").hidden) {
       chart ??= new ProgressChart();
       chart.show(job);
-      // Of a job that was over at once there is no course to show.
+      // A job that ended at once has no progress to show.
       if (FINAL.has(job.state)) byId("progress-card").hidden = chart.points.length < 3;
     }
   });
   const job = /** @type {JobOut | null} */ (last);
-  // A cancelled job has an answer where the search had begun: then it says how it ended.
+  // A cancelled job has an answer if its search had begun: it then has a termination.
   if (job && job.termination !== null) await showAnswer(job);
   if (job) await showOthers(job);
 });
@@ -94,7 +94,7 @@ function showState(job) {
   );
   byId("cancel").hidden = isFinal || job.state === "cancelling";
   byId("rerun").hidden = !isFinal;
-  // Solver, parameters and time limit of its scenario: what a search that ran out of time needs.
+  // Another solver, parameters or time limit for the same scenario: after a search ran out of time, for example.
   byId("other-settings").hidden = !isFinal;
   byId("other-settings").setAttribute("href", `/new#scenario=${encodeURIComponent(job.scenario.id)}`);
   byId("take").hidden = job.state !== "succeeded";
@@ -103,9 +103,9 @@ function showState(job) {
 
 /** @param {JobOut} job */
 async function showAnswer(job) {
-  // Each thing is asked for once: the map's places are the tables' targets too.
+  // Each document is requested once: the tables use the map's targets too.
   const asked = Promise.all([loadGeography(jobPath), loadLand()]);
-  asked.catch(() => {}); // told where it is waited for
+  asked.catch(() => {}); // reported where it is awaited
   const plan = new Plan(/** @type {any} */ (await get(`${jobPath}/timeline.json`)));
   const view = new TimeView(plan.start, plan.end);
   const selection = new Selection();
@@ -131,7 +131,7 @@ async function showAnswer(job) {
 }
 
 /**
- * Return whether a what-if can have it: outages are a replan's, and what is taken is promised by its pin.
+ * Return whether a what-if supports an offer: outages need a replan, and an image in the plan is promised by its pin.
  * @param {import("./offers.js").Offer} offer
  * @param {Selection} selection
  */
@@ -139,7 +139,7 @@ function isTried({ wish }, selection) {
   return wish?.kind !== "outage" && !(wish?.kind === "promise" && selection.now.actionId !== null);
 }
 
-/** Let the browser draw and listen between two pieces of work. */
+/** Let the browser draw and handle events between two pieces of work. */
 function frame() {
   return new Promise((resolve) => setTimeout(resolve));
 }
@@ -224,7 +224,7 @@ async function installDownload() {
   });
 }
 
-/** @returns {Promise<string[]>} the forms in which the service offers timelines */
+/** @returns {Promise<string[]>} the formats in which the service offers timelines */
 async function forms() {
   /** @type {{paths: Record<string, {get: {parameters: {name: string, schema: {examples?: string[]}}[]}}>}} */
   const document = await get("/openapi.json");

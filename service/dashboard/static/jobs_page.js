@@ -1,5 +1,5 @@
 // @ts-check
-/** The list of jobs, live. */
+/** The list of jobs, updated live. */
 
 import { FINAL, get, list, pause, post } from "./api.js";
 import { bar, byId, fill, h } from "./dom.js";
@@ -40,7 +40,7 @@ startPage(async () => {
 });
 
 /**
- * Offer what is stored, by name.
+ * Offer the stored items in a filter, by name.
  * @param {string} name of the filter
  * @param {string} path
  */
@@ -50,7 +50,7 @@ async function offer(name, path) {
   byId(`filter-${name}`).append(...items.map((one) => h("option", { value: one.id }, one.name)));
 }
 
-/** @returns {Promise<boolean>} whether a job is under way */
+/** @returns {Promise<boolean>} whether a job is in progress */
 async function refresh() {
   const query = new URLSearchParams({ limit: String(Math.min(numWanted, 500)) });
   for (const name of ["state", "solver", "satellite_id", "station_id"]) {
@@ -69,7 +69,7 @@ async function refresh() {
 }
 
 /**
- * Show rows in this order, and leave alone what stands there already: focus stays.
+ * Show rows in this order, without touching those in place already: focus stays.
  * @param {HTMLElement} body
  * @param {HTMLElement[]} lines
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** The key of this tab: from a link's fragment, or asked for; never sent but in a header. */
+/** The key of this tab: from a link's fragment, or asked for; only ever sent in a header. */
 
 import { byId, notice } from "./dom.js";
 
@@ -29,7 +29,7 @@ export function adoptKeyFromLink() {
 }
 
 /**
- * Ask for a key; several calls at once ask once.
+ * Ask for a key; simultaneous calls share one dialog.
  * @param {string} why
  */
 export function askForKey(why) {
@@ -59,7 +59,7 @@ async function openDialog(why) {
 export function installKeyDialog() {
   const dialog = /** @type {HTMLDialogElement} */ (byId("key-dialog"));
   const form = byId("key-form");
-  // The policy lets no form send itself; a dialog's form need not.
+  // The page's policy forbids sending forms; this one only closes its dialog.
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     dialog.close("use");
@@ -78,7 +78,7 @@ export function installKeyDialog() {
 }
 
 /**
- * Say who is using the page, and warn of a wall display's link that could change things.
+ * Show whose key the page uses, and warn if a key from a link can change things.
  * @param {import("./types.js").CallerOut} me
  * @param {boolean} cameByLink
  */

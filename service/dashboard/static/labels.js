@@ -1,5 +1,5 @@
 // @ts-check
-/** Names beside the marks of a map: none lies on another one, and what finds no room is left out. */
+/** Names beside the marks of a map: they never overlap, and names without room are left out. */
 
 /** @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen */
 
@@ -10,23 +10,23 @@
  * @property {number} y
  * @property {number} reach half the size of the mark
  * @property {string | undefined} color of the name
- * @property {boolean} [isNamed] false for a mark that only takes room
+ * @property {boolean} [isNamed] false for a mark that only takes up room
  */
 
 /** @typedef {{left: number, top: number, right: number, bottom: number}} Box */
 /** @typedef {{mark: Mark, x: number, y: number, box: Box}} Placed */
 
 const GAP_PX = 3;
-/** Height of a line of text, of its font's size. */
+/** Height of a line of text, in font sizes. */
 const LINE = 1.15;
-/** Where a name may stand, best first, in widths and heights of it from the mark. */
+/** Directions in which a name may lie from its mark, best first: right and down. */
 const PLACES = [[1, 0], [-1, 0], [0, -1], [0, 1], [1, -1], [1, 1], [-1, -1], [-1, 1]];
-/** How far from its mark, in heights of a line: a name further off could be anybody's. */
+/** Extra distances from the mark, in line heights: further away a name could belong to any mark. */
 const RINGS = [0, 0.8];
 
 /**
- * Return where names stand. Earlier marks go first, and a name would rather be left out than lie on
- * another name, on a mark of another thing or over the edge.
+ * Return where names lie. Earlier marks go first; a name that would lie on another name, on another
+ * mark or over the edge is left out.
  * @param {Mark[]} marks by rank
  * @param {{width: number, height: number}} area
  * @param {number} size of the font, in pixels
@@ -79,7 +79,7 @@ function overlap(a, b) {
 }
 
 /**
- * Write the names of marks with the pen's font; return how many found room.
+ * Write the names of marks with the pen's font; return how many had room.
  * @param {Pen} pen
  * @param {Mark[]} marks by rank
  * @param {{width: number, height: number}} area

@@ -74,7 +74,7 @@ function group(plan, selection, code, source) {
     MEANINGS[code] && h("small", {}, ` ${MEANINGS[code]}`),
   );
   const details = h("details", { "data-reason": code }, summary, table.element);
-  // Its first page is here before somebody opens it.
+  // Its first page is loaded before it is opened.
   table.showFrom(source);
   selection.onChange(({ targetId }) => {
     const isHere = targetId !== null && plan.target.get(targetId)?.reason === code;

@@ -20,16 +20,16 @@ import { symbolOf } from "./symbols.js";
 
 const REACH_PX = 8;
 const FONT_PX = 12;
-/** At the bottom stands what instant is shown. */
+/** The height of the line at the bottom that says which instant is shown. */
 const STATUS_PX = 20;
 const TRACK_MS = 50 * 60_000;
-/** Of many satellites, but for the chosen one. */
+/** If there are many satellites, except for the chosen one. */
 const SHORT_TRACK_MS = 6 * 60_000;
-/** Long tracks of more would cover the map. */
+/** Long tracks of more satellites would cover the map. */
 const FEW = 10;
 /** More targets are drawn smaller. */
 const FEW_TARGETS = 2000;
-/** Of two targets of one outcome that lie as near as this only one is drawn. */
+/** Of targets with the same outcome that lie this close together, only one is drawn. */
 const CELL_PX = 1.5;
 const OUTCOMES = ["excluded", "unscheduled", "collected", "downlinked"];
 
@@ -51,7 +51,7 @@ export class WorldMap {
     this.center = { lon: 0, lat: 0 };
     /** @type {{told: string, picture: OffscreenCanvas} | null} */
     this.drawnGround = null;
-    // What is rare lies on top.
+    // Rare outcomes are drawn on top.
     this.byOutcome = OUTCOMES.map((outcome) => ({
       outcome,
       targets: geography.targets.filter((target) => target.outcome === outcome),
@@ -63,7 +63,7 @@ export class WorldMap {
       }
       this.coast.closePath();
     }
-    /** The canvas in pixels; to ask for it anew for each point would cost more than all else. */
+    /** The canvas in pixels: reading it anew for each point would cost more than everything else. */
     this.size = { width: 0, height: 0 };
     const label =
       "Map of targets by outcome, ground tracks around the chosen time, and stations with the " +
@@ -77,7 +77,7 @@ export class WorldMap {
     takeMapInput(this);
   }
 
-  /** The instant that satellites are shown at: of the selection, else now, else the view's. */
+  /** The instant at which satellites are shown: the selected action's, else now, else the view's middle. */
   cursor() {
     const action = this.plan.actions.get(this.selection.now.actionId ?? "");
     if (action) return (Date.parse(action.start) + Date.parse(action.end)) / 2;
@@ -120,7 +120,7 @@ export class WorldMap {
     const selected = this.drawSelected(pen, colors);
     const stations = this.geography.stations.map((station) => this.markOf(station, 6, colors.ink));
     const isChosen = (/** @type {Mark} */ mark) => mark.color === colors.chosen;
-    // What is chosen has its name before all others, and never twice.
+    // The chosen item is named before all others, and only once.
     const others = stations.filter(({ name }) => !selected.some((one) => one.name === name));
     const marks = [...selected, ...satellites.filter(isChosen), ...satellites.filter((one) => !isChosen(one)), ...others];
     writeNames(pen, marks, { width, height: height - STATUS_PX }, FONT_PX);
@@ -129,7 +129,7 @@ export class WorldMap {
   }
 
   /**
-   * Return the picture of all that time and selection do not change, drawn once a zoom.
+   * Return a picture of everything that does not depend on time or selection, redrawn when the map is moved or zoomed.
    * @param {number} width
    * @param {number} height
    * @param {Colors} colors
@@ -203,7 +203,7 @@ export class WorldMap {
    * @param {import("./geography.js").Track} track
    * @param {number} t
    * @param {Colors} colors
-   * @returns {Mark | null} the satellite where it is at t
+   * @returns {Mark | null} the satellite's mark at t; null outside its track
    */
   drawTrack(pen, track, t, colors) {
     const isChosen = track.satelliteId === this.selection.now.satelliteId;
@@ -284,7 +284,7 @@ export class WorldMap {
   /**
    * @param {CanvasRenderingContext2D} pen
    * @param {Colors} colors
-   * @returns {Mark[]} what is selected of targets and stations, if anything
+   * @returns {Mark[]} the selected target or station, if any
    */
   drawSelected(pen, colors) {
     const { targetId, actionId } = this.selection.now;
@@ -321,7 +321,7 @@ export class WorldMap {
 
   /**
    * @param {number} factor
-   * @param {number} [x] the point that stays where it is
+   * @param {number} [x] the point that stays in place
    * @param {number} [y]
    */
   zoomBy(factor, x = this.size.width / 2, y = this.size.height / 2) {

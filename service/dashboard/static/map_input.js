@@ -1,5 +1,5 @@
 // @ts-check
-/** What pointer, wheel and keys do to the map. */
+/** Pointer, wheel and key input of the map. */
 
 /** @typedef {import("./map.js").WorldMap} WorldMap */
 
@@ -69,7 +69,7 @@ function key(map, event) {
 }
 
 /**
- * Select the target after the selected one, or before it; where none is in sight, the first one that is.
+ * Select the visible target after or before the selected one, or the first visible target if that one is not visible.
  * @param {WorldMap} map
  * @param {1 | -1} by
  */
@@ -81,7 +81,7 @@ function selectNext(map, by) {
   if (next) map.selection.select(map.plan.aboutTarget(next.id));
 }
 
-/** Open the menu of the selected target where it lies. @param {WorldMap} map */
+/** Open the menu of the selected target at its position. @param {WorldMap} map */
 function openSelected(map) {
   map.measure();
   const target = map.plan.target.get(map.selection.now.targetId ?? "");

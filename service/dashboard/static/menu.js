@@ -12,7 +12,7 @@ const EDGE_PX = 8;
 let closeOpen = null;
 
 /**
- * Open a menu; the one that is open closes. What opened it has the focus again when it closes.
+ * Open a menu, and close the one that is open. When it closes, the element that opened it gets the focus back.
  * @param {string} label
  * @param {Line[]} lines
  * @param {Anchor} anchor
@@ -38,12 +38,12 @@ export function openMenu(label, lines, anchor) {
     if (goesBack && anchor.element.isConnected) anchor.element.focus({ preventScroll: true });
   };
   menu.addEventListener("keydown", (event) => {
-    // What lies under the menu has keys of its own.
+    // Elements under the menu have keys of their own.
     event.stopPropagation();
     const at = buttons.findIndex((one) => one === document.activeElement);
     const places = /** @type {Record<string, number>} */ ({ ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: -1 });
     const next = places[event.key];
-    if (event.key === "Tab") close(true); // and the focus goes on from there
+    if (event.key === "Tab") close(true); // and the focus moves on from there
     else if (event.key === "Escape") close(true);
     else if (next !== undefined) buttons.at(next % buttons.length)?.focus();
     else return;
@@ -57,7 +57,7 @@ export function openMenu(label, lines, anchor) {
 }
 
 /**
- * Put the menu where it was asked for, and wholly on the screen.
+ * Put the menu at its anchor, entirely on the screen.
  * @param {HTMLElement} menu
  * @param {Anchor} anchor
  */

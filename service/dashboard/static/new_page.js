@@ -1,5 +1,5 @@
 // @ts-check
-/** The form: inputs, a scenario of them, a solver, and off it goes. */
+/** The form for a new plan: makes a scenario of the inputs, and sends a job with the chosen solver. */
 
 import { get, list, post } from "./api.js";
 import { byId, fill, h, notice } from "./dom.js";
@@ -54,7 +54,7 @@ startPage(async () => {
   ]);
 });
 
-/** Suggest a day near the orbits' epochs: elements are good for days, not for months. */
+/** Suggest a start near the orbits' epochs: elements are good for days, not for months. */
 function suggestStart() {
   if (hasOwnStart) return;
   const epochs = choices.satellites.chosen().map((one) => Date.parse(one.epoch));
@@ -141,7 +141,7 @@ async function scenarioId() {
 }
 
 /**
- * Read an instant of UTC: a browser's own field would show it by the reader's country.
+ * Parse a UTC instant. A browser's own date field would follow the reader's locale.
  * @param {string} text
  */
 function instantOf(text) {

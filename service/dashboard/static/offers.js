@@ -1,5 +1,5 @@
 // @ts-check
-/** What can be wished of an action or a target of a plan: the lines of its menu, and its buttons. */
+/** The changes offered for an action or a target of a plan: the entries of its menu, and its buttons. */
 
 import { utc } from "./format.js";
 import { changeOf } from "./settings.js";
@@ -13,11 +13,11 @@ import { changeOf } from "./settings.js";
  * @property {string} id
  * @property {string} text
  * @property {Wish} [wish]
- * @property {string} [weigh] the target whose priority is asked for first
+ * @property {string} [weigh] the target whose priority the user has to enter first
  */
 
 /**
- * Return what can be wished of a collect.
+ * Return the changes offered for a collect.
  * @param {Plan} plan
  * @param {Action} action
  * @returns {Offer[]}
@@ -44,7 +44,7 @@ export function offersOfImage(plan, action) {
 }
 
 /**
- * Return what can be wished of a contact.
+ * Return the changes offered for a contact.
  * @param {Plan} plan
  * @param {Action} action
  * @returns {Offer[]}
@@ -81,7 +81,7 @@ export function offersOfContact(plan, action) {
 }
 
 /**
- * Return what can be wished of a target that has no image.
+ * Return the changes offered for a target that has no image.
  * @param {Plan} plan
  * @param {string} id
  * @returns {Offer[]}
@@ -91,7 +91,7 @@ export function offersOfTarget(plan, id) {
 }
 
 /**
- * Return what a proposal of the service wishes: other settings that would let a target in.
+ * Return the offer to try settings that the service proposes, which would let a target in.
  * @param {Plan} plan
  * @param {Record<string, unknown>} change
  * @param {string} id of the offer
@@ -104,7 +104,7 @@ export function offerOfChange(plan, change, id) {
 }
 
 /**
- * Return the wish that an image earns so much from now on.
+ * Return the wish that an image of a target earns a given reward from now on.
  * @param {Plan} plan
  * @param {string} id
  * @param {number} reward

@@ -1,5 +1,5 @@
 // @ts-check
-/** Opportunities of a scenario, asked for when somebody wants to see them. */
+/** Opportunities of a scenario, requested when the user wants to see them. */
 
 import { list, pause, Problem } from "./api.js";
 import { Lane } from "./plan.js";
@@ -21,7 +21,7 @@ export async function opportunitiesOf(scenarioId, of, onPage = () => {}) {
     try {
       return await list(path, MOST, (items) => onPage(items.length));
     } catch (error) {
-      // The first who asks may have them computed.
+      // They may still have to be computed.
       if (!(error instanceof Problem) || error.code !== "still_computing") throw error;
       await pause(5000);
     }

@@ -1,12 +1,12 @@
 // @ts-check
-/** What became of each target at length, read from the service by the page and when it is looked at. */
+/** Outcomes of targets in detail, read from the service page by page when they are viewed. */
 
 import { get } from "./api.js";
 
 /** @typedef {import("./types.js").TargetItem} TargetItem */
 
 const PAGE = 100;
-/** Reasons whose code is no phrase of its own. @type {Record<string, string>} */
+/** Reasons whose code does not read as a phrase. @type {Record<string, string>} */
 const REASONS = { displaced_by: "displaced by other images" };
 
 /** @param {string} code of a reason */
@@ -44,7 +44,7 @@ export class OutcomeRows {
    */
   load(first, end) {
     if (this.rows.length >= end) return this.rows.slice(first, end);
-    // One after the other: each page names the next.
+    // Pages are read one after the other: each names the next.
     const loaded = this.turn.then(async () => {
       while (this.rows.length < end && this.next) await this.readOn();
       return this.rows.slice(first, end);
@@ -62,7 +62,7 @@ export class OutcomeRows {
 }
 
 /**
- * Return what became of one target.
+ * Return the outcome of one target.
  * @param {string} jobPath
  * @param {string} targetId
  * @returns {Promise<TargetItem | undefined>}

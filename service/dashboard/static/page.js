@@ -1,5 +1,5 @@
 // @ts-check
-/** What every page does: key, clock, state of the service, errors that nobody caught. */
+/** What every page does: key, clock, state of the service, uncaught errors. */
 
 import { get, Problem } from "./api.js";
 import { byId, fill, h, notice } from "./dom.js";
@@ -9,7 +9,7 @@ import { adoptKeyFromLink, installKeyDialog, showCaller } from "./key.js";
 const ASK_HEALTH_MS = 15_000;
 
 /**
- * Start a page; what it fails with is shown.
+ * Start a page; show its error if it fails.
  * @param {() => Promise<void>} show
  */
 export async function startPage(show) {
@@ -32,7 +32,7 @@ export async function startPage(show) {
 }
 
 /**
- * Enter ticks what Space ticks, in place of sending the form around it.
+ * Let Enter tick a box as Space does, instead of sending the form.
  * @param {KeyboardEvent} event
  */
 function tickByEnter(event) {
@@ -91,9 +91,9 @@ export function describe(error) {
 }
 
 /**
- * Do what a button asks for; the button waits, and the form shows what went wrong.
+ * Do a button's work; meanwhile the button is disabled, and an error is shown.
  * @param {HTMLButtonElement} button
- * @param {HTMLElement} place where errors are told
+ * @param {HTMLElement} place where errors are shown
  * @param {() => Promise<void>} work
  */
 export async function whileBusy(button, place, work) {

@@ -12,13 +12,13 @@ import { whileBusy } from "./page.js";
 /** @typedef {{id: string, name: string}} Named */
 
 const HOUR_MS = 3_600_000;
-/** Of more, paper has the planned ones alone: a shift is carried on two pages. */
+/** If there are more, only the planned ones are printed: a shift fits on two pages. */
 const MOST_ON_PAPER = 100;
 
 /**
  * @param {PlanOut} plan
  * @param {Named[]} stations
- * @param {number} from where the shift begins
+ * @param {number} from when the shift begins
  */
 export async function showPasses(plan, stations, from) {
   field("passes-from").value = utc(from);
@@ -99,7 +99,7 @@ function rowOf(one) {
 }
 
 /**
- * Return the passes that overlap this one; on paper by name only those that are planned.
+ * Return the passes that overlap this one; on paper only planned ones are named.
  * @param {PassOut} one
  */
 function conflictsOf(one) {
@@ -120,7 +120,7 @@ function printPasses() {
 }
 
 /**
- * Save what the service answers; fetched rather than linked to, since a link cannot carry the key.
+ * Save a response as a file. It is fetched rather than linked to, since a link cannot carry the key.
  * @param {string} path
  * @param {string} name
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** The data of all pictures as tables, for keyboards and screen readers; on paper those that are open. */
+/** The data of all pictures as tables, for keyboards and screen readers; open ones are printed. */
 
 import { actionButton, targetButton } from "./buttons.js";
 import { byId, fill, h } from "./dom.js";
@@ -51,7 +51,7 @@ function group(title, sections) {
 }
 
 /**
- * Return a table that is made when it is opened.
+ * Return a folded section whose table is made when it is opened.
  * @param {string} title
  * @param {number} count
  * @param {() => HTMLElement} make
@@ -118,7 +118,7 @@ function targetTable(plan, selection) {
 }
 
 /**
- * Return fields that narrow the table of targets.
+ * Return fields that filter the table of targets.
  * @param {Plan} plan
  * @param {PagedTable<TargetPlace>} table
  */
@@ -163,7 +163,7 @@ function choiceOf(what, values) {
 }
 
 /**
- * Keep the line of what is selected marked, also of what was selected before there was a table.
+ * Keep the selected row marked, also if it was selected before the table was made.
  * @param {PagedTable<any>} table
  * @param {Selection} selection
  * @param {(selected: import("./selection.js").Selected) => string | null} keyOf

@@ -1,5 +1,5 @@
 // @ts-check
-/** A timeline made ready for drawing: times as numbers, actions by lane and in order. */
+/** A timeline prepared for drawing: times as numbers, actions by lane and in order. */
 
 import { targetTitle } from "./format.js";
 
@@ -18,7 +18,7 @@ export class Lane {
     this.start = Float64Array.from(spans, (span) => span.start);
     this.end = Float64Array.from(spans, (span) => span.end);
     this.of = spans.map((span) => span.of);
-    // Spans of a broken plan may overlap: ends are searched in a form that only rises.
+    // Spans of a plan that breaks limits may overlap: searches use the latest end so far, which never falls.
     this.lastEnd = Float64Array.from(this.end);
     for (let i = 1; i < this.lastEnd.length; i++) {
       this.lastEnd[i] = Math.max(/** @type {number} */ (this.lastEnd[i]), /** @type {number} */ (this.lastEnd[i - 1]));
@@ -26,7 +26,7 @@ export class Lane {
   }
 
   /**
-   * Return the index of the first span that may reach past an instant.
+   * Return the index of the first span that may end after an instant.
    * @param {number} t
    */
   firstPast(t) {
@@ -34,7 +34,7 @@ export class Lane {
   }
 
   /**
-   * Return what lies at an instant, or nearest to it within a reach.
+   * Return the item at an instant, or the nearest one within a reach.
    * @param {number} t
    * @param {number} reach
    * @returns {T | null}
@@ -92,7 +92,7 @@ export function firstAbove(values, limit) {
  * @property {number} recorderMax
  */
 
-/** A judged plan; its targets come later. */
+/** A plan judged by the referee; its targets are added later. */
 export class Plan {
   /** @param {Timeline} timeline */
   constructor(timeline) {
@@ -109,7 +109,7 @@ export class Plan {
     this.targets = [];
     /** @type {Map<string, TargetPlace>} */
     this.target = new Map();
-    /** @type {Map<string, string>} what targets are called in texts */
+    /** @type {Map<string, string>} names of targets in texts */
     this.titles = new Map();
     this.names = new Map(timeline.satellites.map(({ id, name }) => [id, name]));
     this.rows = timeline.satellites.map((satellite) => this.row(satellite));
@@ -156,7 +156,7 @@ export class Plan {
   }
 
   /**
-   * Return what a selection is about: the action, its target, its satellite.
+   * Return the selection of an action: the action, its target, its satellite.
    * @param {string} actionId
    */
   about(actionId) {
@@ -176,7 +176,7 @@ export class Plan {
   }
 
   /**
-   * Return what an action is about, and its id.
+   * Return an action in words, with its id.
    * @param {string} id
    */
   actionTitle(id) {
@@ -202,7 +202,7 @@ export function spanOf(action) {
   return { start: Date.parse(action.start), end: Date.parse(action.end), of: action };
 }
 
-/** The turn is shown as late as it can be. @param {Action} action */
+/** The turn is shown as late as possible. @param {Action} action */
 function slewOf(action) {
   const end = Date.parse(action.start);
   return { start: end - (action.slew?.needed_s ?? 0) * 1000, end, of: action };

@@ -1,5 +1,5 @@
 // @ts-check
-/** One plan: its life, its passes, what happens to it, and the plan that follows. */
+/** One plan: its states, its passes, what happens to it, and its replans. */
 
 import { get, Problem } from "./api.js";
 import { changesTable } from "./changes.js";
@@ -32,7 +32,7 @@ startPage(async () => {
   /** @type {PlanOut} */
   const plan = await get(planPath);
   const asked = Promise.all([loadGeography(planPath), loadLand()]);
-  asked.catch(() => {}); // told where it is waited for
+  asked.catch(() => {}); // reported where it is awaited
   const changes = plan.parent_id === null ? null : await get(`${planPath}/changes`);
   showLife(plan, changes?.freeze_until ?? null);
   const drawn = new Plan(/** @type {any} */ (await get(`${planPath}/timeline.json`)));
@@ -52,7 +52,7 @@ startPage(async () => {
 });
 
 /**
- * Show all targets, with those that have no image, on the map and as tables.
+ * Show all targets, also those without an image, on the map and in tables.
  * @param {Promise<[import("./geography.js").Geography, {credit: string, rings: number[][]}]>} asked
  * @param {Plan} drawn
  * @param {TimeView} view

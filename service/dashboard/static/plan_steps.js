@@ -1,16 +1,16 @@
 // @ts-check
-/** The steps of a plan's life. */
+/** The steps from one state of a plan to the next. */
 
 import { post } from "./api.js";
 
 /** @typedef {import("./types.js").PlanOut} PlanOut */
 
 /**
- * Take a step; each violation is waived with the reason.
+ * Take a step; approval waives each violation with the reason.
  * @param {PlanOut} plan
  * @param {string} to
  * @param {string} reason
- * @param {string | null} effectiveFrom of `published`
+ * @param {string | null} effectiveFrom for `published`
  * @returns {Promise<PlanOut>}
  */
 export function move(plan, to, reason, effectiveFrom) {
@@ -25,7 +25,7 @@ export function move(plan, to, reason, effectiveFrom) {
   return post(`/v1/plans/${encodeURIComponent(plan.id)}/transitions`, body);
 }
 
-/** Now, where the plan lies around it, else its start: where work on it begins. @param {PlanOut} plan */
+/** Now if the plan's horizon contains it, else the horizon's start: when work on it begins. @param {PlanOut} plan */
 export function nextInstant(plan) {
   const [start, end, now] = [Date.parse(plan.horizon.start), Date.parse(plan.horizon.end), Date.now()];
   return now > start && now < end ? now : start;

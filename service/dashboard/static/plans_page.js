@@ -1,5 +1,5 @@
 // @ts-check
-/** The list of plans, live. */
+/** The list of plans, updated live. */
 
 import { list, pause } from "./api.js";
 import { byId, fill, h } from "./dom.js";

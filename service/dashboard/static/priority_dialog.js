@@ -1,5 +1,5 @@
 // @ts-check
-/** Asks for a target's priority: what its image earns from now on. */
+/** The dialog for a target's priority: what its image earns from now on. */
 
 import { byId, h } from "./dom.js";
 
@@ -16,7 +16,7 @@ export function installPriorityDialog() {
     h("p", { class: "buttons" }, h("button", { type: "submit" }, "Use it"), " ", close),
   );
   const dialog = h("dialog", { id: "priority-dialog", "aria-labelledby": "priority-title" }, form);
-  // The policy lets no form send itself; a dialog's form need not.
+  // The page's policy forbids sending forms; this one only closes its dialog.
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     dialog.close("use");
@@ -26,9 +26,9 @@ export function installPriorityDialog() {
 }
 
 /**
- * Ask for the priority; null where nobody gives one.
+ * Ask for the priority; return null if none is given.
  * @param {string} title of the target
- * @param {number | null} reward what it is
+ * @param {number | null} reward the current priority
  * @returns {Promise<number | null>}
  */
 export async function askForPriority(title, reward) {

@@ -1,5 +1,5 @@
 // @ts-check
-/** Reward against bound while a job runs, from when the page is opened. */
+/** Reward and bound while a job runs, from the moment the page is opened. */
 
 import { Canvas } from "./canvas.js";
 import { bar, byId, fill } from "./dom.js";

@@ -1,5 +1,5 @@
 // @ts-check
-/** How far a job is, in words, with a clock that moves while nothing else does. */
+/** A job's progress in words, with a clock that moves even while nothing else does. */
 
 import { FINAL } from "./api.js";
 import { fill, h } from "./dom.js";
@@ -11,7 +11,7 @@ export class ProgressText {
   /** @param {HTMLElement} place */
   constructor(place) {
     this.words = h("span");
-    // A timer is not read aloud at each second, though it stands in what is.
+    // Screen readers do not read a timer aloud every second, even inside a status.
     this.clock = h("span", { role: "timer" });
     /** @type {JobOut | null} */
     this.job = null;
@@ -25,7 +25,7 @@ export class ProgressText {
 
   /**
    * @param {JobOut} job
-   * @param {string} words what there is to say of its progress
+   * @param {string} words its progress; "" if unknown
    */
   show(job, words) {
     this.job = job;
@@ -40,14 +40,14 @@ export class ProgressText {
       return;
     }
     const since = Date.parse(this.job.started_at ?? this.job.created_at);
-    // A screen whose clock is behind the service's counts from when it began to look.
+    // If this clock is behind the service's, count from when the page began to watch.
     const elapsed = Math.max(Date.now() - since, performance.now() - this.shownAt);
     this.clock.textContent = `, for ${countdown(elapsed)}${ending(this.job, elapsed)}`;
   }
 }
 
 /**
- * Say when the search ends at the latest, as far as that is known.
+ * Return when the search ends at the latest, as far as that is known.
  * @param {JobOut} job
  * @param {number} elapsed milliseconds
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** The plan that follows: asked for, looked at, and only then taken. */
+/** Replans: requested, looked at, and only then taken. */
 
 import { follow, get, post } from "./api.js";
 import { changesTable } from "./changes.js";
@@ -89,7 +89,7 @@ function installOutages(plan, stations, wishes) {
 }
 
 /**
- * Return the draft of the plan that follows, once it is found.
+ * Request a replan; return its draft once the job has ended.
  * @param {PlanOut} plan
  * @param {Wishes} wishes
  * @returns {Promise<PlanOut>}
@@ -99,7 +99,7 @@ async function propose(plan, wishes) {
   const isUnderWay = Date.now() > Date.parse(plan.horizon.start) && Date.now() < Date.parse(plan.horizon.end);
   const body = {
     freeze_until: freeze,
-    // A plan of another day is tried out as of its own time.
+    // A plan for another day is replanned as if now were the end of the freeze.
     ...(isUnderWay ? {} : { now: freeze }),
     ...replanOf(wishes.all),
     limits: { time_s: Number(field("replan-time").value) },

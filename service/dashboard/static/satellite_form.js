@@ -67,7 +67,7 @@ function field(id, text, input) {
 }
 
 /**
- * What a field leaves out is the type's, not what the schema says of a satellite of the paper.
+ * Show that empty fields take the type's values: the schema's defaults are those of the paper's satellite.
  * @param {Schema} schema
  * @returns {Schema}
  */

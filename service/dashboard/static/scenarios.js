@@ -1,5 +1,5 @@
 // @ts-check
-/** Names of scenarios, read once each. */
+/** Names of scenarios, each read once. */
 
 import { get, Problem } from "./api.js";
 import { counted, short, utc } from "./format.js";

@@ -1,13 +1,13 @@
 // @ts-check
-/** A form made from the JSON Schema in which the service describes parameters. */
+/** A form made from the JSON Schema that describes parameters. */
 
 import { h } from "./dom.js";
 
 /** @typedef {import("./types.js").Schema} Schema */
 
 /**
- * Fields for the simple properties of an object. Empty fields are left out of the answer, so
- * that the service's own defaults hold.
+ * Fields for the simple properties of an object. Empty fields are left out of the values, so
+ * that the service's own defaults apply.
  */
 export class SchemaForm {
   /**
@@ -31,7 +31,7 @@ export class SchemaForm {
     this.element = h("div", { class: "fields" }, ...lines);
   }
 
-  /** @returns {Record<string, unknown>} what was filled in */
+  /** @returns {Record<string, unknown>} the values that were entered */
   values() {
     /** @type {Record<string, unknown>} */
     const found = {};
@@ -53,7 +53,7 @@ export class SchemaForm {
 
 /**
  * @param {Schema} property
- * @returns {Kind | null} null for what has no simple field
+ * @returns {Kind | null} null for properties without a simple field
  */
 function kindOf(property) {
   const options = property.anyOf ?? [property];

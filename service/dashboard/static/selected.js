@@ -1,5 +1,5 @@
 // @ts-check
-/** All there is to say about what is selected. */
+/** All details of the selected item. */
 
 import { get, pause, Problem } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -91,7 +91,7 @@ async function offerAccess(plan, job, targetId, desk, place, isWanted) {
 }
 
 /**
- * Return what the service knows of a target, or null where nobody wants it any more.
+ * Return the service's explanation of a target, or null once it is no longer wanted.
  * @param {string} jobId
  * @param {string} targetId
  * @param {() => boolean} isWanted
@@ -103,7 +103,7 @@ async function explanationOf(jobId, targetId, isWanted) {
     try {
       return await get(path);
     } catch (error) {
-      // It is still being worked out.
+      // It is still being computed.
       if (!(error instanceof Problem && error.status === 503)) throw error;
       await pause(1000);
     }

@@ -1,5 +1,5 @@
 // @ts-check
-/** What is selected, for all panels of a page alike. */
+/** The selection that all panels of a page share. */
 
 /** @typedef {{actionId: string | null, targetId: string | null, satelliteId: string | null}} Selected */
 
@@ -29,7 +29,7 @@ export class Selection {
   }
 
   /**
-   * Hear of it when somebody wants to work on what is selected.
+   * Call a function when the user wants to work on the selected item.
    * @param {(anchor: Anchor) => void} opener
    */
   onOpen(opener) {

@@ -1,5 +1,5 @@
 // @ts-check
-/** Changes of settings, as the service proposes them, in operators' words. */
+/** Changes of settings that the service proposes, in operators' words. */
 
 import { number, utc } from "./format.js";
 
@@ -21,7 +21,7 @@ const SAID = {
 };
 
 /**
- * Say a change in words, whatever fields it has.
+ * Return a change in words, whatever fields it has.
  * @param {import("./plan.js").Plan} plan
  * @param {Record<string, unknown> | null} change in the form of a what-if's `relax`
  */
@@ -41,7 +41,7 @@ function* partsOf(plan, change) {
   for (const [name, value] of settingsOf(change)) {
     const told = name === "drop_actions" ? withoutActions(plan, /** @type {string[]} */ (value)) : SAID[name]?.(value);
     const words = told ?? `${name.replaceAll("_", " ")} ${typeof value === "object" ? JSON.stringify(value) : value}`;
-    // The target and the sensor may have the same limit: it is said once.
+    // The target and the sensor may have the same limit: it is named once.
     if (!said.has(words)) yield words;
     said.add(words);
   }

@@ -1,5 +1,5 @@
 // @ts-check
-/** A choice of spacecraft types: those of one's own first, then those that are built in. */
+/** A choice of spacecraft types: the user's own first, then the built-in ones. */
 
 import { list } from "./api.js";
 import { fill, h } from "./dom.js";

@@ -1,5 +1,5 @@
 // @ts-check
-/** How a job or a plan stands, in a word and a colour: never green where its plan breaks limits. */
+/** The state of a job or a plan in a word and a colour: never green if the plan breaks limits. */
 
 import { h } from "./dom.js";
 

@@ -1,5 +1,5 @@
 // @ts-check
-/** What a plan is worth: its figures, and before all else what is wrong with it. */
+/** What a plan is worth: its violations first, then its figures. */
 
 import { actionButton } from "./buttons.js";
 import { bar, byId, fill, h } from "./dom.js";

@@ -1,8 +1,8 @@
 // @ts-check
-/** The pictures of targets on a map, drawn once and stamped often. */
+/** Symbols of targets on a map, drawn once and copied for each target. */
 
 /**
- * Return the picture of a target. Shapes differ as well as colours: disc, square, ring, cross.
+ * Return the symbol of an outcome. Shapes differ as well as colours: disc, square, ring, cross.
  * @param {string} outcome
  * @param {number} size
  * @param {string} color

@@ -1,13 +1,13 @@
 // @ts-check
-/** Tables of any length: a page of rows at a time, and few tables may show all of theirs. */
+/** Tables of any length: a page of rows at a time, or all rows of a table that is not too long. */
 
 import { fill, h } from "./dom.js";
 import { showError } from "./page.js";
 
 const ROWS = 100;
-/** More rows in one page would make it slow; whoever wants them has the downloads. */
+/** More rows on one page would make it slow; the downloads have them all. */
 const MOST_ROWS = 1000;
-/** Rows that are made between two frames. */
+/** Rows made per frame. */
 const AT_ONCE = 100;
 
 /**
@@ -19,11 +19,11 @@ const AT_ONCE = 100;
  */
 
 /**
- * Rows that are here, or come when they are asked for.
+ * Rows in memory, or loaded when they are needed.
  * @template T
  * @typedef {object} Source
  * @property {number} length
- * @property {(key: string) => number} indexOf where the row of a key is; -1 for none
+ * @property {(key: string) => number} indexOf the index of the row with a key; -1 for none
  * @property {(first: number, end: number) => T[] | Promise<T[]>} load
  */
 
@@ -35,7 +35,7 @@ export class PagedTable {
   /**
    * @param {string} caption
    * @param {Column<T>[]} columns
-   * @param {(row: T) => string} keyOf names a row, to mark it
+   * @param {(row: T) => string} keyOf identifies a row, to mark it
    */
   constructor(caption, columns, keyOf) {
     this.columns = columns;
@@ -82,7 +82,7 @@ export class PagedTable {
   }
 
   /**
-   * Mark rows; turn to the page of the first one if none is in sight.
+   * Mark rows; turn to the page of the first one if it is not shown.
    * @param {Set<string>} keys
    */
   mark(keys) {
@@ -125,10 +125,10 @@ export class PagedTable {
   }
 
   /**
-   * Append rows from one on, some now and the rest after the next frame.
+   * Append rows from an index on, some now and the rest in the next frames.
    * @param {T[]} rows
    * @param {number} from
-   * @param {number} mine which drawing these are of
+   * @param {number} mine the number of the drawing that the rows belong to
    */
   append(rows, from, mine) {
     if (mine !== this.numDrawn) return;

@@ -1,5 +1,5 @@
 // @ts-check
-/** Targets of a catalogue: how far each has come, and its priority, to be changed. */
+/** Targets of a catalogue: the state of each, and its priority, which can be changed. */
 
 import { call, list } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -18,7 +18,7 @@ let table;
 /** @type {TargetLifeOut[]} */
 let lives = [];
 let etag = "";
-/** @type {Map<string, number>} what is typed and not yet saved, by target */
+/** @type {Map<string, number>} priorities typed but not yet saved, by target */
 const edited = new Map();
 
 startPage(async () => {
@@ -53,7 +53,7 @@ async function read() {
   edited.clear();
   const [catalog, state] = [field("catalog").value, field("state").value];
   const query = new URLSearchParams({ catalog_id: catalog, ...(state ? { state } : {}) });
-  // Before the targets: whoever changes them in between is not overwritten.
+  // Read before the targets, so that changes made in between are not overwritten.
   const response = await call(catalogPath(), { cache: "no-store" });
   const found = await list(`/v1/targets?${query}`, MOST_TARGETS);
   if (catalog !== field("catalog").value || state !== field("state").value) return;

@@ -1,5 +1,5 @@
 // @ts-check
-/** The span of time that all panels show, and the axis below them. */
+/** The time span that all panels show, and the ticks of its axis. */
 
 const SHORTEST_MS = 10_000;
 const SECOND = 1000;
@@ -48,8 +48,8 @@ export class TimeView {
   }
 
   /**
-   * @param {number} factor below 1 shows less
-   * @param {number} [at] the instant that stays where it is
+   * @param {number} factor below 1 zooms in
+   * @param {number} [at] the instant that stays in place
    */
   zoom(factor, at = (this.start + this.end) / 2) {
     const wanted = Math.min(Math.max((this.end - this.start) * factor, SHORTEST_MS), this.max - this.min);
@@ -62,7 +62,7 @@ export class TimeView {
   }
 
   /**
-   * Move as little as brings a span into sight.
+   * Centre a span, unless all of it is visible already.
    * @param {number} start
    * @param {number} end
    */
@@ -74,7 +74,7 @@ export class TimeView {
   }
 
   /**
-   * Ticks on round instants of UTC, as many as fit.
+   * Return ticks at round UTC instants, as many as fit.
    * @param {number} width in pixels
    * @returns {{at: number, text: string}[]}
    */
@@ -93,7 +93,7 @@ export class TimeView {
 }
 
 /**
- * Let a pointer, a wheel and keys move the view: drag, sideways or Ctrl wheel, arrows, + and -.
+ * Let a pointer, a wheel and keys move the view: drag, sideways wheel, Ctrl and wheel, arrows, + and -.
  * @param {HTMLCanvasElement} canvas
  * @param {TimeView} view
  * @param {{left: number, right: number}} margin of the time axis within the canvas

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Shapes of the API's answers, as far as the pages use them. A test holds each of them against
+ * Shapes of the API's answers, as far as the pages use them. A test compares each of them with
  * the OpenAPI document or a real timeline: names of types and properties must be the service's.
  */
 
@@ -169,7 +169,7 @@
  */
 
 /**
- * A reason of `TargetItem`; `change` has further fields by its kind.
+ * A reason of `TargetItem`; the fields of `change` depend on its kind.
  * @typedef {object} Reason
  * @property {string} code
  * @property {string} certainty
@@ -292,7 +292,7 @@
  */
 
 /**
- * The part of JSON Schema in which the service describes parameters.
+ * The part of JSON Schema that the service uses to describe parameters.
  * @typedef {object} Schema
  * @property {string | string[]} [type]
  * @property {unknown[]} [enum]
@@ -330,7 +330,7 @@
  */
 
 /**
- * A target over all plans.
+ * The state of a target across all plans.
  * @typedef {object} TargetLifeOut
  * @property {{id: string, name: string | null, reward: number, due: string | null}} target
  * @property {string} state
@@ -419,7 +419,7 @@
  * @property {string} first
  * @property {string} last
  * @property {number} num_values
- * @property {number | null} num_targets of values by target
+ * @property {number | null} num_targets if values are given by target
  * @property {string[]} notes
  */
 

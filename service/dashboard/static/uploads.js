@@ -1,5 +1,5 @@
 // @ts-check
-/** What is stored and can be ticked: satellites, target catalogues, stations; and uploads. */
+/** Stored satellites, target catalogues and stations, to be ticked; and uploads of new ones. */
 
 import { list, upload } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -9,7 +9,7 @@ import { describe } from "./page.js";
 const SHOWN = 500;
 
 /**
- * One kind of input: its stored things as boxes to tick, and its upload.
+ * One kind of input: checkboxes for the stored items, and an upload.
  * @template {{id: string}} T
  */
 export class Choices {
@@ -32,7 +32,7 @@ export class Choices {
     input.addEventListener("change", () => this.take(input, send));
   }
 
-  /** Read what is stored. */
+  /** Read the stored items. */
   async refresh() {
     const { items, isAll } = await list(this.path, SHOWN);
     this.things = new Map(/** @type {T[]} */ (items).map((thing) => [thing.id, thing]));
@@ -41,13 +41,13 @@ export class Choices {
     this.onChange();
   }
 
-  /** @returns {T[]} what is ticked */
+  /** @returns {T[]} the ticked items */
   chosen() {
     return [...this.things.values()].filter((thing) => this.ticked.has(thing.id));
   }
 
   /**
-   * Tick more things.
+   * Tick more items.
    * @param {string[]} ids
    */
   async add(ids) {
@@ -96,7 +96,7 @@ export class Choices {
     } catch (error) {
       fill(outcome, h("div", { class: "notice bad", role: "alert" }, h("div", {}, ...describe(error))));
     } finally {
-      // So that the same file, mended, can be chosen again.
+      // So that the same file can be chosen again once it is corrected.
       input.value = "";
     }
   }
@@ -183,7 +183,7 @@ async function mediaTypeOfTargets(file) {
   return isGeo ? "application/geo+json" : "application/json";
 }
 
-/** Return the three kinds of inputs of the page. */
+/** Return the page's three kinds of input. */
 export function allChoices() {
   return {
     satellites: new Choices(

@@ -1,5 +1,5 @@
 // @ts-check
-/** The figures of the wall, from a plan and an instant. */
+/** Figures for the wall, from a plan at an instant. */
 
 import { percent, utc } from "./format.js";
 import { firstAbove } from "./plan.js";
@@ -9,7 +9,7 @@ import { firstAbove } from "./plan.js";
 /** @typedef {import("./types.js").PlanChangesOut} PlanChangesOut */
 
 /**
- * Return battery and recorder at an instant, between the knots of their curves.
+ * Return battery and recorder at an instant, interpolated between the knots of their curves.
  * @param {Row} row
  * @param {number} at
  */
@@ -29,7 +29,7 @@ export function resourcesAt(row, at) {
 }
 
 /**
- * Return how many images are on board by the plan, and how old the oldest is.
+ * Return how many images are on board according to the plan, and the age of the oldest.
  * @param {Plan} plan
  * @param {Row} row
  * @param {number} at
@@ -44,7 +44,7 @@ export function onBoard(plan, row, at) {
 }
 
 /**
- * Return an age in whole minutes: nobody reads seconds at four metres.
+ * Return an age in whole minutes: nobody reads seconds from four metres away.
  * @param {number} seconds
  */
 export function age(seconds) {

@@ -14,7 +14,7 @@ const DAY_MS = 86_400_000;
 const REDRAW_MS = 1000;
 
 /**
- * Return where the sun stands overhead, to a hundredth of a degree or so (Astronomical Almanac).
+ * Return where the sun is overhead, to about a hundredth of a degree (Astronomical Almanac).
  * @param {number} at milliseconds
  */
 export function sunOverhead(at) {
@@ -84,7 +84,7 @@ export class WallMap {
       pen.arc(one.x, one.y, one.reach, 0, 2 * Math.PI);
       pen.fill();
     }
-    // Operators know where their stations are, and not where a satellite is.
+    // Satellites are named first: operators know where their stations are.
     writeNames(pen, [...satellites, ...stations], { width, height }, size);
   }
 
@@ -115,7 +115,7 @@ export class WallMap {
    */
   drawNight(pen, x, y, colors) {
     const sun = sunOverhead(this.now());
-    // At the equinox the terminator is a meridian: its latitude is steep, but never undefined.
+    // At the equinox the terminator is a meridian: a sun slightly off the equator avoids a division by zero.
     const tangent = Math.tan((Math.abs(sun.lat) < 0.01 ? 0.01 : sun.lat) * RADIANS);
     pen.fillStyle = colors.eclipse ?? "";
     pen.beginPath();

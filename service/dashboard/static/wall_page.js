@@ -1,5 +1,5 @@
 // @ts-check
-/** The wall: what the shift watches, without a hand on it. It asks again until it is answered. */
+/** The wall: a display for the shift, without interaction. It retries until the service answers. */
 
 import { get, list, pause } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -51,7 +51,7 @@ startPage(async () => {
 
 let silentSince = "";
 
-/** @param {string} trouble the first one since the last answer is shown */
+/** @param {string} trouble "" for none; the first one since the last answer is shown */
 function tell(trouble) {
   silentSince = trouble === "" ? "" : silentSince || trouble;
   const at = shift === 0 ? "" : `As of ${utc(now())} UTC. `;
@@ -60,7 +60,7 @@ function tell(trouble) {
   byId("wall-status").classList.toggle("bad", silentSince !== "" || lack !== "");
 }
 
-/** Say it where nothing that is in force reaches to this time. */
+/** Return a message if no plan in force covers this time, else "". */
 function lackOfPlans() {
   if (shown.size === 0) return "No plan is in force.";
   const end = Math.max(...[...shown.values()].map(({ drawn }) => drawn.end));
@@ -68,7 +68,7 @@ function lackOfPlans() {
 }
 
 /**
- * Try until it works: a wall that is switched on before the service waits for it.
+ * Retry until it works: a wall may be switched on before the service.
  * @template T
  * @param {() => Promise<T>} work
  * @returns {Promise<T>}
@@ -171,14 +171,14 @@ function tick() {
   });
   const satellites = byId("wall-satellites").querySelector("tbody");
   if (satellites) fill(satellites, ...rows);
-  // Nobody scrolls a wall: the longer table says how large letters may be.
+  // Nobody scrolls a wall: the longer table decides how large letters can be.
   const most = Math.max(next.length, rows.length);
   document.body.classList.toggle("crowded", most > FEW_ROWS);
   document.body.style.setProperty("--rows", String(most));
 }
 
 /**
- * Return the pass of each station that is on, or else the next one; planned ones go first.
+ * Return the current pass of each station, or else its next one; planned passes are preferred.
  * @param {number} at
  */
 function nextOfStations(at) {

@@ -1,5 +1,5 @@
 // @ts-check
-/** What if: the job's question with some changes, and what would come of it. */
+/** What if: plans the job's scenario with some changes, and shows what would change. */
 
 import { follow, get, post } from "./api.js";
 import { byId, fill, h } from "./dom.js";
@@ -13,11 +13,11 @@ import { whatIfOf } from "./wishes.js";
 /** @typedef {import("./types.js").PlannedOut} PlannedOut */
 
 const MOST_ROWS = 100;
-/** Of a job's label. */
+/** The length limit of a job's label. */
 const MOST_LETTERS = 200;
 
 /**
- * Let the changes that are gathered be tried as a whole.
+ * Let the collected changes be tried together.
  * @param {JobOut} job
  * @param {import("./wishes.js").Wishes} wishes
  */
@@ -38,7 +38,7 @@ export function installWhatIf(job, wishes) {
 /**
  * @param {JobOut} job
  * @param {Record<string, unknown>} change the body of a what-if
- * @param {HTMLElement} place where its progress is told
+ * @param {HTMLElement} place where its progress is shown
  * @returns {Promise<{varied: JobOut, diff: DiffOut}>}
  */
 async function tried(job, change, place) {
@@ -99,7 +99,7 @@ function row(change, one, was, is) {
 }
 
 /**
- * Say by how much a start moves, where instants to the second would not show it.
+ * Return by how much a start moves if that is less than a minute, else "": instants to the second would hardly show it.
  * @param {string} was
  * @param {string} is
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** What can be wished of what is selected, as buttons and as a menu. */
+/** The changes offered for the selected item, as buttons and as a menu. */
 
 import { h } from "./dom.js";
 import { utc } from "./format.js";
@@ -15,7 +15,7 @@ export class WishDesk {
    * @param {import("./plan.js").Plan} plan
    * @param {import("./selection.js").Selection} selection
    * @param {import("./wishes.js").Wishes} wishes
-   * @param {(offer: Offer) => boolean} takes whether the page can ask for that
+   * @param {(offer: Offer) => boolean} takes whether the page supports an offer
    */
   constructor(plan, selection, wishes, takes) {
     this.plan = plan;
@@ -25,13 +25,13 @@ export class WishDesk {
     installPriorityDialog();
   }
 
-  /** The collect or contact that is selected. @returns {Action | undefined} */
+  /** The selected collect or contact. @returns {Action | undefined} */
   action() {
     const action = this.plan.actions.get(this.selection.now.actionId ?? "");
     return action?.mode === "collect" || action?.mode === "contact" ? action : undefined;
   }
 
-  /** What is selected, in words. */
+  /** The selected item in words. */
   title() {
     const action = this.action();
     if (action) return this.words(action);
@@ -46,7 +46,7 @@ export class WishDesk {
     return `${utc(action.start)} ${this.plan.satelliteName(this.plan.satelliteOf.get(action.id) ?? "")}: ${what}`;
   }
 
-  /** What can be wished of what is selected. @returns {Offer[]} */
+  /** The changes offered for the selected item. @returns {Offer[]} */
   offers() {
     return this.allOffers().filter(this.takes);
   }

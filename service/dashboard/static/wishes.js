@@ -1,5 +1,5 @@
 // @ts-check
-/** What is to be different of a plan: gathered one by one, then asked for as a whole. */
+/** Requested changes to a plan: collected one by one, then sent together. */
 
 import { byId, fill, h } from "./dom.js";
 
@@ -7,11 +7,11 @@ import { byId, fill, h } from "./dom.js";
  * @typedef {object} Wish
  * @property {string} text for people
  * @property {"keep" | "skip" | "promise" | "drop" | "reward" | "outage" | "setting"} kind
- * @property {any} value an action, a target's id, target and reward, an outage, or settings as `relax` has them
- * @property {Record<string, string>} [stances] what it says of what: a later wish that says otherwise takes its place
+ * @property {any} value an action, a target's id, target and reward, an outage, or settings in the form of `relax`
+ * @property {Record<string, string>} [stances] what it says about each subject: a later wish that contradicts it replaces it
  */
 
-/** Shown as lines that can be removed. */
+/** The list of wishes, shown as lines that can be removed. */
 export class Wishes {
   constructor() {
     /** @type {Wish[]} */
@@ -37,7 +37,7 @@ export class Wishes {
       const at = this.all.indexOf(wish);
       this.all = this.all.filter((one) => one !== wish);
       this.show();
-      // Whoever goes by keyboard stays where they are.
+      // Keyboard users keep their place in the list.
       const left = byId("wishes").querySelectorAll("button");
       (left[Math.min(at, left.length - 1)] ?? byId("wishes-title")).focus();
     };
@@ -86,7 +86,7 @@ function valuesOf(wishes, kind) {
 }
 
 /**
- * Return both settings in one: those of a satellite under its id, those of targets under theirs.
+ * Return settings with more added: those of a satellite under its id, those of targets under theirs.
  * @param {Record<string, any>} relax
  * @param {Record<string, any>} more
  * @returns {Record<string, any>}
@@ -113,7 +113,7 @@ function merged(known, more) {
 }
 
 /**
- * Return whether two wishes cannot both be had.
+ * Return whether two wishes contradict each other.
  * @param {Wish} one
  * @param {Wish} other
  */
