@@ -23,7 +23,6 @@ const MEANINGS = {
   not_considered: "the search did not consider them",
   not_delivered: "they could be imaged, but not downlinked in time",
   solver_limit: "there is room for them, but the solver did not find it",
-  duplicate: "already imaged",
 };
 
 /**
