@@ -26,7 +26,7 @@ _STATIONS: Final = {"fleet-stations-4x2000": 30.0}
 _AGE: Final = {"half-life-12h-1000": 12.0}
 _DELIVERED: Final = {"delivered-paper-500": 12.0}
 _SUN: Final = {"share-sun-fleet-4x500": 15.0, "sun-fleet-4x2000": 20.0}
-_ROOMS: Final[Mapping[str, Mapping[str, float]]] = {
+_PACKAGES: Final[Mapping[str, Mapping[str, float]]] = {
     "strategies.agility": {**_AGILITY, **_PASSES},
     "strategies.resources": _ONE,
     "strategies.resource_steps": _ONE,
@@ -74,8 +74,8 @@ def constants() -> dict[str, Change]:
             readers.setdefault(name, set()).add(module.__name__.split(".", 2)[2])
     changes = {}
     for each in fields(Tuning):
-        rooms = sorted(readers.get(each.name, set()) & set(_ROOMS))
-        families = {family: s for room in rooms for family, s in _ROOMS[room].items()}
+        packages = sorted(readers.get(each.name, set()) & set(_PACKAGES))
+        families = {family: s for package in packages for family, s in _PACKAGES[package].items()}
         for label, factor in FACTORS.items():
             value = getattr(TUNING, each.name)
             if families and (changed := scaled(value, factor)) != value:
