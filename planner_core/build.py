@@ -141,8 +141,8 @@ def _with_frozen(scenario: Scenario, table: Opportunities) -> tuple[Opportunitie
         site = f"target {action.target_id!r}" if action.target_id else "the station"
         raise InvalidScenario(
             "frozen_not_kept",
-            f"By its newest elements satellite {action.satellite_id!r} does not see {site} at "
-            f"{action.start:%Y-%m-%dT%H:%M:%SZ}: end the freeze before, or skip the action.",
+            f"With its newest elements, satellite {action.satellite_id!r} does not see {site} at "
+            f"{action.start:%Y-%m-%dT%H:%M:%SZ}: end the freeze earlier, or skip the action.",
             pointer=f"/replan/base/{number}",
         )
     if len(made.table) == len(table):

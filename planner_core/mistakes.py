@@ -40,7 +40,7 @@ def mistakes_of_accesses(scenario: Scenario, table: Opportunities) -> tuple[str,
     if not (scenario.use_resources and scenario.ground_stations):
         return ()
     if not (table.kind == CONTACT).any():
-        return ("No satellite has a contact with any ground station: no image comes down.",)
+        return ("No satellite has a contact with any ground station: no image can be downlinked.",)
     too_much = _more_than_contacts_take(scenario, table)
     return () if too_much is None else (too_much,)
 
@@ -75,8 +75,8 @@ def _more_than_contacts_take(scenario: Scenario, table: Opportunities) -> str | 
     if needed <= most:
         return None
     return (
-        f"All contacts together take down {100.0 * most / needed:.0f} % of one image of each "
-        "target in sight at most: add ground stations or plan a longer horizon."
+        f"All contacts together can downlink at most {100.0 * most / needed:.0f} % of one image of "
+        "each visible target: add ground stations or plan a longer horizon."
     )
 
 
@@ -96,13 +96,13 @@ def _at_sea(scenario: Scenario) -> str | None:
     if share > _MUCH_AT_SEA and float(swapped.mean()) > _SWAPPED_ON_LAND:
         return (
             f"{at_sea.sum()} of {len(targets)} targets are at sea, and {swapped.sum()} would be on "
-            "land with latitude and longitude swapped: look at the columns of the catalogue."
+            "land with latitude and longitude swapped: check the columns of the catalogue."
         )
     if share > _MOST_AT_SEA:
         first = targets[int(np.flatnonzero(at_sea)[0])].title
         return (
-            f"{at_sea.sum()} of {len(targets)} targets are at sea, {first!r} first: look at signs "
-            "and columns if that is not what is meant."
+            f"{at_sea.sum()} of {len(targets)} targets are at sea, the first of them {first!r}: "
+            "check signs and columns if that is not intended."
         )
     return None
 
@@ -118,8 +118,8 @@ def _at_night(scenario: Scenario) -> str | None:
         return None
     return (
         f"Satellite {blind[0].name!r}{_others(len(blind))} may image {dark} of "
-        f"{len(scenario.targets)} targets at night: give sun_elevation_min_deg to the sensor or to "
-        "the targets, or sensor_type radar to a sensor that needs no light."
+        f"{len(scenario.targets)} targets at night: set sun_elevation_min_deg for the sensor or "
+        "the targets, or sensor_type radar for a sensor that needs no light."
     )
 
 
@@ -137,14 +137,14 @@ def _never_ages(scenario: Scenario) -> str | None:
     if objective.half_life_s is None or objective.collected_share < 1.0:
         return None
     return (
-        "The objective's half_life_s changes nothing: with a collected_share of 1, as it is where "
-        "none is given beside it, images earn all of their worth when they are taken."
+        "The objective's half_life_s has no effect: with a collected_share of 1, the default "
+        "beside it, images earn all of their worth when they are taken."
     )
 
 
 def _no_station(scenario: Scenario) -> str | None:
     if scenario.use_resources and not scenario.ground_stations:
-        return "There is no ground station: no image comes down."
+        return "There is no ground station: no image can be downlinked."
     return None
 
 
@@ -172,8 +172,8 @@ def _too_hungry(scenario: Scenario) -> str | None:
     if not hungry:
         return None
     return (
-        f"An image of target {hungry[0].title!r}{_others(len(hungry))} takes more energy than the "
-        "battery of any satellite may give: shorten collect_s or enlarge battery_capacity_wh."
+        f"An image of target {hungry[0].title!r}{_others(len(hungry))} needs more energy than the "
+        "battery of any satellite may supply: shorten collect_s or enlarge battery_capacity_wh."
     )
 
 
@@ -189,7 +189,7 @@ def _too_long(scenario: Scenario) -> str | None:
         return None
     return (
         f"An image of target {long[0].title!r}{_others(len(long))} takes longer than any satellite "
-        f"sees a place, {longest_s:.0f} s at most: shorten collect_s."
+        f"sees a target (at most {longest_s:.0f} s): shorten collect_s."
     )
 
 

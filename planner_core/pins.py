@@ -102,12 +102,12 @@ class Pins:
             _require(
                 action.end is None or (action.start is not None and action.end >= action.start),
                 f"{at}/end",
-                "end needs a start, and lies not before it.",
+                "end needs a start, and must not be before it.",
             )
             _require(
                 action.station_id is None or has_contacts,
                 f"{at}/station_id",
-                "Without use_resources no contacts are planned.",
+                "Without use_resources, no contacts are planned.",
             )
         for i, blocked in enumerate(self.block):
             at = f"/pins/block/{i}"

@@ -40,7 +40,7 @@ class Certified:
         metadata={
             "minimum": 0,
             "maximum": 100_000,
-            "description": "How long to improve the plan, at most: moves for each opportunity.",
+            "description": "Most moves to improve the plan, per opportunity.",
         },
     )
 

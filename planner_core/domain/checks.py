@@ -72,7 +72,7 @@ def check_light(limits: LightLimits) -> None:
     require(
         (begin is None) == (end is None) and (begin is None or begin != end),
         "local_time_to_h",
-        "needs a local_time_from_h that differs from it, and the other way round",
+        "needs a different local_time_from_h, and vice versa",
     )
 
 

@@ -43,9 +43,9 @@ class Objective:
             "must be greater than 0, or null for no decay",
         )
         is_known = all(aim in get_args(Preference) for aim in self.prefer)
-        require(is_known, "objective/prefer", f"must be of {', '.join(get_args(Preference))}")
+        require(is_known, "objective/prefer", f"may contain only {', '.join(get_args(Preference))}")
         is_once = len(set(self.prefer)) == len(self.prefer)
-        require(is_once, "objective/prefer", "must name each aim once")
+        require(is_once, "objective/prefer", "must name each aim at most once")
 
     @classmethod
     def collected(cls) -> Self:

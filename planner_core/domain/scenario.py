@@ -79,7 +79,8 @@ class Scenario:
             or self.dynamics == "physical"
             or all(s.resources.knows_free_charge_alone for s in self.satellites),
             "dynamics",
-            "paper knows neither turns to the sun nor idle_power_w: use sun_pointing free without",
+            "paper has neither turns to the sun nor idle_power_w: use sun_pointing free and no "
+            "idle_power_w",
         )
         if self.use_resources:
             self._check_downlinks()
@@ -102,7 +103,7 @@ class Scenario:
             require(
                 not self.continuous_starts,
                 "continuous_starts",
-                "a plan to go on from has opportunities at fixed starts",
+                "a replan needs opportunities at fixed starts",
             )
             self.replan.check(satellite_ids, target_ids, station_ids)
 
@@ -143,8 +144,8 @@ class Scenario:
         require(
             not (self.continuous_starts and any(s.agility.tracks for s in self.satellites)),
             "continuous_starts",
-            "how fast lines of sight move is known at the starts of opportunities only: "
-            "use collect_spacing_s with slew_model moving",
+            "the rates of lines of sight are known only at the starts of opportunities: use "
+            "collect_spacing_s with slew_model moving",
         )
 
     def _check_ids(self) -> None:
@@ -180,8 +181,8 @@ class Scenario:
                 require(
                     bool(slowest >= resources.telemetry_per_s),
                     f"satellites/{index}/resources/downlink_rate_mbit_s",
-                    f"above {lowest_deg:g} deg at {station.name!r} it falls below the rate of "
-                    "telemetry: raise the station's min_elevation_deg to where data comes down",
+                    f"above {lowest_deg:g} deg at {station.name!r} it falls below the telemetry "
+                    "rate: raise the station's min_elevation_deg to where it does not",
                 )
 
 
@@ -207,9 +208,9 @@ def check_coverage(forecast: Forecast, horizon: Horizon, targets: Sequence[Targe
         outside_s = first_s if first_s < begins_s else max(first_s, ends_s)
         raise InvalidScenario(
             "forecast_does_not_cover",
-            f"The forecast says nothing of target {target.id!r} at "
+            f"The forecast does not cover target {target.id!r} at "
             f"{horizon.instant(float(outside_s)):%Y-%m-%dT%H:%M:%SZ}; give the forecast a "
-            "default_clear_probability for what it does not cover.",
+            "default_clear_probability for such cases.",
             pointer=f"/targets/{position}",
         )
 

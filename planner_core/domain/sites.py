@@ -119,7 +119,9 @@ class GroundStation:
         require_finite(self, "lat_deg", "lon_deg", "alt_m", "min_elevation_deg", "min_contact_s")
         require(-90 <= self.lat_deg <= 90, "lat_deg", "must be between -90 and 90")
         require(-180 <= self.lon_deg <= 360, "lon_deg", "must be between -180 and 360")
-        require(0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90")
+        require(
+            0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be at least 0 and below 90"
+        )
         require(self.min_contact_s >= 0, "min_contact_s", "must be 0 or more")
         require(self.antennas >= 1, "antennas", "must be 1 or more")
         require_finite(self, "setup_s", "downlink_gain")

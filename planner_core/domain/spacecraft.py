@@ -160,7 +160,9 @@ class Sensor:
             "off_nadir_max_deg",
             "must be between off_nadir_min_deg and 90",
         )
-        require(0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be from 0 to below 90")
+        require(
+            0 <= self.min_elevation_deg < 90, "min_elevation_deg", "must be at least 0 and below 90"
+        )
         check_light(self)
         check_sensor_type(self.sensor_type)
 

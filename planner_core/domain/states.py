@@ -114,7 +114,11 @@ class OnBoard:
             With a pointer that begins with ``pointer``.
         """
         faults: list[tuple[bool, str, str]] = [
-            (self.collected_at > at, "collected_at", "An image on board was collected before."),
+            (
+                self.collected_at > at,
+                "collected_at",
+                "An image on board cannot be collected after the state.",
+            ),
             (
                 (self.mbit is None) == (self.recorder_fraction is None),
                 "mbit",
@@ -196,14 +200,14 @@ def check_states(
         if state.satellite_id in known:
             raise InvalidScenario(
                 "duplicate_state",
-                f"There is another state of {state.satellite_id!r} before this one.",
+                f"An earlier entry already gives a state of {state.satellite_id!r}.",
                 pointer=f"{pointer}/satellite_id",
             )
         known.add(state.satellite_id)
         if not horizon.start - OLDEST_STATE <= state.at <= horizon.start:
             raise InvalidScenario(
                 "value_out_of_range",
-                "A state must be of the horizon's start, or of the seven days before it.",
+                "A state must be at the horizon's start, or in the seven days before it.",
                 pointer=f"{pointer}/at",
             )
         for field in ("battery_fraction", "recorder_fraction"):
@@ -231,6 +235,6 @@ def _check_on_board(
     if listed > held + _ROUNDING:
         raise InvalidScenario(
             "value_out_of_range",
-            f"The images come to {listed:.6g} of the recorder, which holds {held:g}.",
+            f"The images add up to {listed:.6g} of the recorder, which holds {held:g}.",
             pointer=f"{pointer}/on_board",
         )

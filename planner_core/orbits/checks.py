@@ -72,18 +72,18 @@ def orbit_warnings(scenario: Scenario) -> tuple[str, ...]:
     generic = sorted({s.spacecraft for s in scenario.satellites if s.spacecraft in _GENERIC})
     if generic:
         warnings.append(
-            f"Satellites plan with the figures of the built-in type {' and '.join(generic)}, "
-            "which are those of a class: give your own agility, sensor and resources."
+            f"Satellites use the figures of the built-in type {' and '.join(generic)}, which are "
+            "typical of their class: give your own agility, sensor and resources."
         )
     if not shipped().covers(scenario.horizon):
         warnings.append(
-            "The horizon reaches outside the table of the Earth's orientation: its end values "
-            "are held, and access times may be off by up to a second."
+            "The horizon extends beyond the table of the Earth's orientation: its end values are "
+            "used there, and access times may be off by up to a second."
         )
     if scenario.continuous_starts and not scenario.has_continuous_starts:
         warnings.append(
-            "continuous_starts has no effect: in dynamics 'paper' tasks begin at the starts of "
-            "opportunities alone."
+            "continuous_starts has no effect: with dynamics 'paper', tasks begin only at the "
+            "starts of opportunities."
         )
     return tuple(warnings)
 

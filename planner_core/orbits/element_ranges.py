@@ -76,7 +76,7 @@ _ANGLE = (_is_angle, "must be between -360 and 360")
 _RATE = (_is_rate, "must be smaller than 1e9 in magnitude")
 _CHECKS: dict[str, tuple[Callable[[float], bool], str]] = {
     "mean_motion_rev_day": (lambda n: 0.0 < n < 20.0, "must be above 0 and below 20"),
-    "eccentricity": (lambda e: 0.0 <= e < 1.0, "must be from 0 to below 1"),
+    "eccentricity": (lambda e: 0.0 <= e < 1.0, "must be at least 0 and below 1"),
     "inclination_deg": (lambda i: 0.0 <= i <= 180.0, "must be between 0 and 180"),
     "raan_deg": _ANGLE,
     "arg_perigee_deg": _ANGLE,

@@ -112,7 +112,7 @@ def read_elements(data: bytes, media_type: str) -> Ingested:
     try:
         text = data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
-        return _refuse("not_utf8", f"The file is not UTF-8: byte {error.start} does not fit")
+        return _refuse("not_utf8", f"The file is not UTF-8: byte {error.start} is invalid")
     if kind in _TEXT_FORMS:
         return _from_messages(_TEXT_FORMS[kind](text))
     if not _is_kvn(text):

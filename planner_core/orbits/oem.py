@@ -81,17 +81,20 @@ def ephemeris_of(segments: Sequence[OemSegment]) -> OrbitEphemeris:
     read = [_segment(segment) for segment in segments]
     names = {(one.meta["OBJECT_NAME"], one.meta["OBJECT_ID"]) for one in segments}
     if len(names) > 1:
-        raise _refused("oem_unsupported", "The segments are of several objects: give each its own")
+        raise _refused(
+            "oem_unsupported", "The segments are of several objects: give each its own message"
+        )
     for before, after in itertools.pairwise(read):
         if after.start < before.stop:
             detail = (
-                f"The segment that is usable from {_text(after.start)} begins before the last ends"
+                f"The segment that is usable from {_text(after.start)} begins before the "
+                "previous one ends"
             )
             raise _refused("oem_times", detail)
     name, object_id = names.pop()
     for text in (name, object_id):
         if not is_plain_text(text):
-            raise _refused("omm_text", "OBJECT_NAME or OBJECT_ID is too long or no printable text")
+            raise _refused("omm_text", "OBJECT_NAME or OBJECT_ID is too long or not printable text")
     axis_km, eccentricity = _shape(read[0])
     return OrbitEphemeris(
         name=name or None,
@@ -237,7 +240,7 @@ def _segment(read: OemSegment) -> EphemerisSegment:
                        rows.get("START_TIME"))  # fmt: skip
     for earlier, later, (_, _, row) in zip(times, times[1:], read.states[1:], strict=False):
         if later <= earlier:
-            raise _refused("oem_times", "The states are not in order of time", row)
+            raise _refused("oem_times", "The states are not in time order", row)
     numbers = np.array([_numbers(texts, row) for _, texts, row in read.states])
     shift = timedelta(seconds=_to_utc_s(meta["TIME_SYSTEM"], times[0], rows.get("TIME_SYSTEM")))
     start, stop = (
@@ -294,7 +297,8 @@ def _rule(meta: Mapping[str, str], rows: Mapping[str, int]) -> tuple[str, int]:
         raise _refused("value_out_of_range", detail, row)
     if name == "HERMITE" and degree % 2 == 0:
         detail = (
-            f"INTERPOLATION_DEGREE is {degree}: HERMITE, with a rate at each state, has odd ones"
+            f"INTERPOLATION_DEGREE is {degree}: HERMITE, with a velocity at each state, needs "
+            "an odd one"
         )
         raise _refused("value_out_of_range", detail, row)
     return name, degree
@@ -311,7 +315,7 @@ def _instant(text: str, row: int | None) -> datetime:
     except (ValueError, OverflowError):
         instant = None
     if instant is None or instant.tzinfo is not None or "T" not in tidy:
-        detail = f"{_shown(text)} is no instant: write 2026-01-31T12:00:00.000"
+        detail = f"{_shown(text)} is not an instant: write 2026-01-31T12:00:00.000"
         raise _refused("oem_epoch", detail, row)
     if not 1957 <= instant.year <= 2199:
         raise _refused(
@@ -342,14 +346,14 @@ def _numbers(texts: Sequence[str], row: int | None) -> list[float]:
             numbers.append(float(text))
         except ValueError:
             raise _refused(
-                "oem_number_format", f"{name} is {_shown(text)}, no number", row
+                "oem_number_format", f"{name} is {_shown(text)}, not a number", row
             ) from None
     radius_km = math.sqrt(sum(x * x for x in numbers[:3]))
     if not _LOWEST_KM <= radius_km <= _HIGHEST_KM:
-        detail = f"The state is {radius_km:.0f} km from the Earth's centre, in kilometres"
+        detail = f"The state is {radius_km:.0f} km from the Earth's centre: positions must be in km"
         raise _refused("value_out_of_range", detail, row)
     if not all(abs(rate) <= _FASTEST_KM_S for rate in numbers[3:]):
-        detail = f"A velocity is beyond {_FASTEST_KM_S:.0f} km/s: velocities are in km/s"
+        detail = f"A velocity exceeds {_FASTEST_KM_S:.0f} km/s: velocities must be in km/s"
         raise _refused("value_out_of_range", detail, row)
     return numbers
 
@@ -364,7 +368,7 @@ def _shape(segment: EphemerisSegment) -> tuple[float, float]:
     energy = 0.5 * square - _GM_KM3_S2 / radius_km
     if energy >= 0.0:
         raise _refused(
-            "value_out_of_range", "The first state leaves the Earth: velocities are in km/s"
+            "value_out_of_range", "The first state escapes the Earth: velocities must be in km/s"
         )
     momentum = np.cross(position, velocity)
     square = 1.0 + 2.0 * energy * float(momentum @ momentum) / _GM_KM3_S2**2

@@ -78,7 +78,7 @@ def require_covered(orbit: OrbitEphemeris, horizon: Horizon) -> None:
     more = ", ..." if len(orbit.segments) > 3 else ""
     raise InvalidScenario(
         "orbit_outside_span",
-        f"The ephemeris of {orbit.name!r} is usable {spans}{more}, and the plan needs it "
+        f"The ephemeris of {orbit.name!r} is usable from {spans}{more}, but the plan needs it from "
         f"{_text(horizon.start)} to {_text(horizon.end)}.",
     )
 

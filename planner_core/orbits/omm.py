@@ -140,7 +140,7 @@ def _is_present(fields: Mapping[str, object], key: str) -> bool:
 
 def _missing(fields: Mapping[str, object], key: str) -> str:
     if key == "MEAN_MOTION" and _is_present(fields, "SEMI_MAJOR_AXIS"):
-        return "is missing; SGP4 needs it, SEMI_MAJOR_AXIS cannot stand for it"
+        return "is missing; SGP4 needs it, and SEMI_MAJOR_AXIS cannot replace it"
     return "is missing"
 
 
@@ -226,7 +226,9 @@ def _epoch(value: object) -> datetime:
         second = day.replace(hour=part["hour"], minute=part["minute"], second=part["second"])
         instant = second + timedelta(microseconds=microseconds)
     except (ValueError, OverflowError) as error:
-        raise _refuse("omm_epoch", "EPOCH", f"is {_shown(value)}, no such instant") from error
+        raise _refuse(
+            "omm_epoch", "EPOCH", f"is {_shown(value)}, which is not a valid instant"
+        ) from error
     if day.year != part["year"]:
-        raise _refuse("omm_epoch", "EPOCH", f"is {_shown(value)}, no such day of the year")
+        raise _refuse("omm_epoch", "EPOCH", f"is {_shown(value)}, which is not a day of that year")
     return instant

@@ -332,7 +332,7 @@ class _Draft:
         elif key not in _KEYWORDS and _COVARIANCE.fullmatch(key) is None:
             self._refuse("omm_unknown_keyword", f"Unknown keyword {_shown(key)}", key, row)
         elif key in self._fields:
-            self._refuse("omm_duplicate_key", f"{key} stands twice in one message", key, row)
+            self._refuse("omm_duplicate_key", f"{key} appears twice in one message", key, row)
         elif unit is not None and unit.strip().lower() != _UNITS.get(key):
             detail = f"{key} is in {_shown(unit)}, must be in {_UNITS.get(key)}"
             self._refuse("omm_unit", detail, key, row)

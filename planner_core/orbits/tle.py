@@ -121,7 +121,7 @@ def read_tle(lines: Sequence[str]) -> TleReading:
             "tle_missing_line", f"An element set has 2 lines, got {len(lines)}", pointer="/tle"
         )
     if lines[0][:2] == "2 " and lines[1][:2] == "1 ":
-        raise InvalidElements("tle_line_order", "Line 2 stands before line 1", pointer="/tle/0")
+        raise InvalidElements("tle_line_order", "Line 2 comes before line 1", pointer="/tle/0")
     tidy = []
     warnings = []
     for index, text in enumerate(lines):

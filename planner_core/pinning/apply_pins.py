@@ -98,7 +98,7 @@ def _check_conflicts(
     for position, kept in enumerate(ordered):
         if is_too_soon[kept.row]:
             raise _conflict(
-                kept, "the satellite cannot turn to it in time from where it looked at the start"
+                kept, "the satellite cannot turn to it in time from its initial attitude"
             )
         if is_ruled_out[kept.row]:
             raise _conflict(kept, "another pin or an outage rules it out")
@@ -141,7 +141,10 @@ def _check_antennas(problem: Problem, contacts: Sequence[Kept]) -> None:
         is_earlier[position] = False
         earlier = np.flatnonzero(is_earlier)
         if len(earlier) >= problem.station_antennas[site[position]]:
-            why = f"the station then serves what {contacts[int(earlier[0])].pointer} keeps"
+            why = (
+                "the station then serves the contact that "
+                f"{contacts[int(earlier[0])].pointer} keeps"
+            )
             raise _conflict(kept, why)
 
 

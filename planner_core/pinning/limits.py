@@ -89,7 +89,7 @@ def check_limits(
             if not can_keep(problem, index, flown, missing):
                 raise InvalidScenario(
                     "pin_breaks_limits",
-                    "Without the contacts that it and the pins before it rule out no plan keeps "
+                    "Without the contacts that it and the pins before it rule out, no plan keeps "
                     f"the limits: {_what_breaks(problem, flown)}",
                     pointer=pointer,
                 )
@@ -100,7 +100,7 @@ def check_limits(
             if not can_keep(problem, index, must, missing):
                 raise InvalidScenario(
                     "pin_breaks_limits",
-                    "With it and the kept actions before it no plan keeps the limits: "
+                    "With it and the kept actions before it, no plan keeps the limits: "
                     + _what_breaks(problem, must),
                     pointer=one.pointer,
                 )

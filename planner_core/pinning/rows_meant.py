@@ -148,7 +148,7 @@ def row_of(named: Named, pin: PinnedAction, pointer: str) -> int:
     if pin.start is None and len(rows) > 1:
         raise InvalidScenario(
             "pin_ambiguous",
-            f"It names {len(rows)} opportunities; a start would tell which one is meant.",
+            f"It matches {len(rows)} opportunities; give a start to say which one.",
             pointer=pointer,
         )
     return int(rows[np.argmin(np.abs(table.start_s[rows] - start_s))])
@@ -175,7 +175,10 @@ def _number_of(opportunity_id: str) -> int:
 
 def _why_none(scenario: Scenario, table: Opportunities, named: Longs, pin: PinnedAction) -> str:
     if len(named) == 0 or pin.start is None:
-        return "The scenario has no opportunity like this."
+        return "The scenario has no such opportunity."
     away_s = np.abs(table.start_s[named] - scenario.horizon.offset_s(pin.start))
     nearest: datetime = scenario.horizon.instant(float(table.start_s[named[np.argmin(away_s)]]))
-    return f"No opportunity then; the nearest one starts at {nearest:%Y-%m-%dT%H:%M:%SZ}."
+    return (
+        "There is no opportunity at that time; the nearest one starts at "
+        f"{nearest:%Y-%m-%dT%H:%M:%SZ}."
+    )

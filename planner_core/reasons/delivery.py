@@ -21,7 +21,7 @@ _MOST_ACTIONS: Final = 10_000
 """The most actions replayed for the reasons of one plan, at 0.13 ms each: just over a second."""
 _NOTHING: Final = 1e-9
 _SETTLED: Final = frozenset({"solver_limit", "displaced_by"})
-_UNSURE: Final = "When images come down then was not worked out."
+_UNSURE: Final = "Its effect on the downlink of images was not computed."
 
 
 def weighed_by_delivery(
@@ -123,10 +123,10 @@ def _weighed(problem: Problem, trial: _Trial, target: int, reason: Reason) -> Re
             reason, code="solver_limit", certainty="verified", reward_delta=delta, detail=said
         )
     if not is_down and reason.code in _SETTLED:
-        said = "It could be taken, but would not come down by the end of the horizon."
+        said = "It could be taken, but would not be downlinked by the end of the horizon."
         return replace(reason, code="not_delivered", reward_delta=delta, detail=said)
     if not reason.blocking:
-        said = "It could be taken, but others would come down later or not at all."
+        said = "It could be taken, but others would be downlinked later or not at all."
         return replace(reason, code="not_delivered", reward_delta=delta, detail=said)
     said = (
         f"It fits in place of {len(reason.blocking)} of the plan's actions; the reward changes "
@@ -134,5 +134,5 @@ def _weighed(problem: Problem, trial: _Trial, target: int, reason: Reason) -> Re
     )
     if reason.code in _SETTLED:
         return replace(reason, code="displaced_by", reward_delta=delta, detail=said)
-    said = f"With it the {reason.code} would reach its limit. {said}"
+    said = f"With it, the {reason.code} would reach its limit. {said}"
     return replace(reason, reward_delta=delta, detail=said)

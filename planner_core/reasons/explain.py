@@ -52,19 +52,18 @@ from planner_core.worth import gain
 
 NO_ACCESS: Final = {
     NEVER_VISIBLE: "No satellite rises above its horizon during the planning horizon.",
-    OUTSIDE_LIMITS: "It is visible, but never within the limits of the sensor and its own.",
+    OUTSIDE_LIMITS: "It is visible, but never within the limits of the sensor and the target.",
     ACCESS_TOO_SHORT: "Every access is shorter than its collect.",
-    WRONG_SENSOR_TYPE: "Satellites rise above its horizon, but none that carries its sensor type.",
+    WRONG_SENSOR_TYPE: "Satellites rise above its horizon, but none with its sensor type.",
     OUTSIDE_TIMES: "It has accesses, but none with room for its collect between its release and "
     "due times.",
     BETWEEN_STARTS: "Its accesses have no room for its collect at any start of the grid.",
 }
 _EXCLUDED: Final = "A pin forbids it."
-_BLOCKED: Final = "Pins rule all its opportunities out."
-_OUT: Final = "An outage takes all its opportunities."
+_BLOCKED: Final = "Pins rule out all its opportunities."
+_OUT: Final = "Outages rule out all its opportunities."
 _TOO_SOON: Final = (
-    "Each of its opportunities begins before a satellite can have turned to it from where that "
-    "looked at the start."
+    "Each of its opportunities begins before a satellite can turn to it from its initial attitude."
 )
 _ROUNDED: Final = 1e4  # fractions of capacity are stated in steps of one in this many
 _SURE: Final = 2e-9  # of capacity: a margin so that a stated limit is not reached
@@ -164,8 +163,8 @@ def _without_opportunity(problem: Problem, positions: Mapping[int, int], target:
     return Reason(
         code="slew_conflict",
         certainty="proven",
-        detail="Each of its opportunities lies too close to an action that a pin keeps, or in "
-        "an interval that one blocks.",
+        detail="Each of its opportunities lies too close to an action that a pin keeps, or in an "
+        "interval that a pin blocks.",
         blocking=tuple(sorted(positions[row] for row in kept if row in positions)),
     )
 

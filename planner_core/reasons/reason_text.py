@@ -72,8 +72,8 @@ class ReasonRenderer:
             return Reason(
                 code="not_considered",
                 certainty="heuristic",
-                detail="The plan has room for it, but the search looked at the first "
-                f"{breadth} tasks only (breadth), and it was none of those.",
+                detail="The plan has room for it, but the search looked only at the first "
+                f"{breadth} tasks (breadth), and it was not one of those.",
                 opportunity=opportunity,
             )
         else:
@@ -126,17 +126,17 @@ class ReasonRenderer:
     def _detail(self, c: int, limit: str | None, delta: float | None, num_blocking: int) -> str:
         said = []
         if not self.planned.is_sound:
-            said.append("The plan breaks limits of this satellite as it is.")
+            said.append("The plan already breaks limits of this satellite.")
         if self.forced.first[c] < self.forced.last[c]:
             said.append("The satellite cannot turn in time between it and planned actions.")
         if np.isinf(self.forced.loss[c]):
             said.append("One of those is pinned.")
         if limit is not None:
-            said.append(f"With it the {limit} would reach its limit.")
+            said.append(f"With it, the {limit} would reach its limit.")
         if delta is not None:
             actions = "1 action" if num_blocking == 1 else f"{num_blocking} actions"
             change = f"changes by {delta:+g}" if delta else "stays the same"
             said.append(f"It fits in place of {actions}; the reward {change}.")
             if self.search.is_optimal and delta <= 0.0:
-                said.append("The plan is proven optimal: none with it earns more.")
+                said.append("The plan is proven optimal: no plan with it earns more.")
         return " ".join(said)

@@ -178,7 +178,7 @@ def _with_time(
     if row is None:
         raise InvalidScenario(
             "pin_without_opportunity",
-            f"Target {action.target_id!r} has no opportunity that it could be forced by.",
+            f"Target {action.target_id!r} has no opportunity that could be forced.",
             pointer=pointer,
         )
     table = problem.opportunities

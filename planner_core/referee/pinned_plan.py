@@ -51,7 +51,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Violation]:
         if kind == COLLECT and site in pinned.forbidden:
             why.append("Its target is forbidden.")
         if row in pinned.skipped:
-            why.append(f"It is what {pinned.skipped[row]} skips.")
+            why.append(f"It is an action that {pinned.skipped[row]} skips.")
         codes: list[tuple[ViolationCode, str]] = [("pin", detail) for detail in why]
         codes += [
             ("outage", f"It lies in the outage {blocked.pointer}.")
@@ -59,7 +59,7 @@ def breaches(problem: Problem, plan: Plan) -> list[Violation]:
             if blocked.is_outage
         ]
         if pinned.is_frozen(action.start_s) and row not in kept_rows:
-            codes.append(("frozen", "It starts before the freeze, and was not planned there."))
+            codes.append(("frozen", "It starts within the freeze, but is not a frozen action."))
         found += [
             Violation(
                 satellite=satellite, at_s=action.start_s, needed=0.0, available=1.0,

@@ -74,7 +74,7 @@ def turns(problem: Problem, plan: Plan, index: int, positions: Sequence[int]) ->
         code: ViolationCode
         if gap_s[i] < -TIME_TOLERANCE_S:
             code, needed, available = "overlap", 0.0, float(gap_s[i])
-            detail = f"It starts {-available:.3f} s before the task ahead of it ends."
+            detail = f"It starts {-available:.3f} s before the previous task ends."
         elif available_s[i] < needed_s - TIME_TOLERANCE_S:
             code, needed, available = "slew", needed_s, float(available_s[i])
             detail = f"The turn of {angle_deg:.2f} deg takes {needed_s:.3f} s."
@@ -98,7 +98,7 @@ def _first_turns(
         first = _first_slew(problem, index, action)
         if first is not None and first.available_s < first.needed_s - TIME_TOLERANCE_S:
             detail = (
-                f"The turn of {first.angle_deg:.2f} deg from where it looked at the start takes "
+                f"The turn of {first.angle_deg:.2f} deg from the initial attitude takes "
                 f"{first.needed_s:.3f} s."
             )
             found.append(

@@ -82,10 +82,10 @@ def require_promises(question: Question, plan: Plan) -> None:
         ):
             raise _late(question, plan, target, i)
         why = (
-            "each of its opportunities takes the place of something else promised or flown, or "
-            "breaks battery or recorder"
+            "each of its opportunities would displace something promised or flown, or break "
+            "limits of battery or recorder"
             if len(problem.collects_of(target)) > 0
-            else "nothing is left that could image it"
+            else "no opportunity to image it is left"
         )
         raise InvalidScenario(
             "promise_not_kept",
@@ -98,13 +98,13 @@ def _late(question: Question, plan: Plan, target: int, number: int) -> InvalidSc
     down_s = question.down_s(plan).get(target)
     name = question.problem.target_ids[target]
     said = (
-        "its image is never on the ground"
+        "its image is never downlinked"
         if down_s is None
-        else f"it is on the ground {down_s - question.deadline_s[target]:.0f} s too late"
+        else f"it is downlinked {down_s - question.deadline_s[target]:.0f} s too late"
     )
     return InvalidScenario(
         "promise_not_kept",
-        f"The promised target {name!r} is not delivered in time: {said}, and no contact before "
-        "would do that leaves what is promised and flown.",
+        f"The promised target {name!r} is not delivered in time: {said}, and no earlier contact "
+        "would do without displacing what is promised or flown.",
         pointer=f"/replan/promises/{number}/deliver_by",
     )

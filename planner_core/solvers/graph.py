@@ -33,7 +33,7 @@ class Graph:
     title: ClassVar[str] = "Graph search"
     about: ClassVar[str] = (
         "Finds the chain of images that is worth most, and only then looks at battery and "
-        "recorder. Quick; strong where images alone count."
+        "recorder. Quick; strong if only images count."
     )
     paper: ClassVar[str] = "Algorithm 3, section Graph Search"
     exact: ClassVar[bool] = False

@@ -54,8 +54,8 @@ class Mcts:
     name: ClassVar[str] = "mcts"
     title: ClassVar[str] = "SMDP Monte Carlo tree search"
     about: ClassVar[str] = (
-        "Samples many futures at each step and follows those that turn out well. Finds "
-        "better plans the longer it may take."
+        "Samples many futures at each step and follows those that turn out well. Finds better "
+        "plans the longer it runs."
     )
     paper: ClassVar[str] = "Algorithm 2, section Solution Methods"
     exact: ClassVar[bool] = False
@@ -65,7 +65,7 @@ class Mcts:
     num_simulations: int = field(
         default=500,
         metadata=_described(
-            "Futures that are sampled at each step: more find better plans, but take longer.",
+            "Futures sampled at each step: more of them give better plans, but take longer.",
             minimum=1,
             maximum=1_000_000,
         ),

@@ -26,8 +26,8 @@ class Milp:
     name: ClassVar[str] = "milp"
     title: ClassVar[str] = "Mixed-integer linear programming"
     about: ClassVar[str] = (
-        "Hands the whole question to a mathematical solver, and proves the plan best if "
-        "there is time. For small missions."
+        "Passes the whole problem to a mathematical solver, and proves the plan optimal if there "
+        "is time. For small missions."
     )
     paper: ClassVar[str] = "Section Mixed-Integer Linear Programming"
     exact: ClassVar[bool] = True

@@ -45,7 +45,7 @@ def solver_class(name: str) -> type[Solver]:
         known = ", ".join(sorted(SOLVERS))
         raise UnknownSolver(
             "unknown_solver",
-            f"No solver is called {name!r}; there are: {known}.",
+            f"There is no solver {name!r}; available: {known}.",
             pointer="/solver",
         )
     return SOLVERS[name]

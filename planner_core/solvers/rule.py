@@ -25,8 +25,8 @@ class Rule:
     name: ClassVar[str] = "rule"
     title: ClassVar[str] = "Rule-based planner"
     about: ClassVar[str] = (
-        "Takes what comes next in time, and turns to the sun where battery or recorder "
-        "forbid it. The quickest, for a first look."
+        "Takes the next task in time, and turns to the sun if battery or recorder forbid it. The "
+        "quickest, for a first look."
     )
     paper: ClassVar[str] = "Algorithm 4, section Rule-Based Planning"
     exact: ClassVar[bool] = False

@@ -193,7 +193,7 @@ def test_the_turn_takes_what_it_takes() -> None:
             (outcome,) = explain(left, Plan(), replay(left, Plan()))
             assert outcome.reason is not None
             assert (outcome.reason.code, outcome.reason.certainty) == ("slew_conflict", "proven")
-            assert "looked at the start" in outcome.reason.detail
+            assert "initial attitude" in outcome.reason.detail
             with pytest.raises(InvalidScenario) as caught:
                 apply_pins(whole, Pinned(kept=(Kept(row=0, pointer="/pins/keep/0"),)))
             assert caught.value.fault.code == "pins_conflict"

@@ -285,7 +285,7 @@ def test_a_reason_says_that_an_image_would_not_come_down() -> None:
     assert (first.outcome, second.outcome) == ("downlinked", "unscheduled")
     assert second.reason is not None
     assert second.reason.code == "not_delivered"
-    assert "would not come down by the end of the horizon" in second.reason.detail
+    assert "would not be downlinked by the end of the horizon" in second.reason.detail
     assert second.reason.reward_delta == 0.0
 
 
@@ -346,7 +346,7 @@ def test_reasons_replay_what_promises_most_and_no_more_than_allowed(
 
     def unsure(outcomes: tuple[TargetOutcome, ...]) -> set[int]:
         reasons = ((one.target, one.reason) for one in outcomes)
-        return {target for target, r in reasons if r and "not worked out" in r.detail}
+        return {target for target, r in reasons if r and "not computed" in r.detail}
 
     num_all = sum(len(trial.actions) for trial in replayed)
     replayed.clear()

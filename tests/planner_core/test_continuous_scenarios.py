@@ -142,7 +142,7 @@ def test_a_kept_start_lies_in_its_access(judged: Judged) -> None:
     assert again.problem.opportunities.end_s[kept] == table.access_end_s[row]
     assert again.timeline.is_valid
     away = horizon.instant(float(table.access_end_s[row]) + 60.0)
-    with pytest.raises(InvalidScenario, match="No opportunity then"):
+    with pytest.raises(InvalidScenario, match="no opportunity at that time"):
         pinned(judged, Pins(keep=(PinnedAction(target_id=name, start=away),)))
 
 

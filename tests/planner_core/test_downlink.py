@@ -524,7 +524,7 @@ def test_flows_are_empty_while_a_contact_is_set_up() -> None:
 def test_a_rate_below_telemetry_is_refused() -> None:
     slow = replace(BY_ELEVATION, downlink_by_elevation=((5.0, 0.0), (10.0, 0.001)))
     flown = replace(satellite(orbit()), resources=slow)
-    with pytest.raises(InvalidScenario, match="falls below the rate of telemetry"):
+    with pytest.raises(InvalidScenario, match="falls below the telemetry rate"):
         _mission(satellites=(flown,))
     high = tuple(replace(s, min_elevation_deg=8.0) for s in (SVALBARD, TROLL))
     _mission(satellites=(flown,), ground_stations=high)

@@ -223,7 +223,7 @@ def low_and_typed(**of_target: Any) -> Scenario:
     [
         ({}, ACCESS_FOUND, ""),
         ({"sensor_type": "visible"}, ACCESS_FOUND, ""),
-        ({"sensor_type": "infrared"}, WRONG_SENSOR_TYPE, "none that carries its sensor type"),
+        ({"sensor_type": "infrared"}, WRONG_SENSOR_TYPE, "none with its sensor type"),
         ({"sensor_type": "infrared", "lat_deg": 90.0}, NEVER_VISIBLE, "rises above"),
         ({"sensor_type": "visible", "lat_deg": 20.0}, OUTSIDE_LIMITS, "limits of the sensor"),
         ({"collect_s": 3000.0, "due": at(60.0)}, ACCESS_TOO_SHORT, "shorter than its collect"),

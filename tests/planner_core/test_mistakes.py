@@ -69,7 +69,7 @@ def test_data_must_have_a_way_down() -> None:
     out_of_sight = replace(asked, ground_stations=(replace(STATION, min_elevation_deg=89.9),))
     table = compute_opportunities(out_of_sight, Budget()).opportunities
     (warning,) = mistakes_of_accesses(out_of_sight, table)
-    assert "no image comes down" in warning
+    assert "no image can be downlinked" in warning
 
 
 def but_long(asked: Scenario) -> tuple[str, ...]:
@@ -97,7 +97,7 @@ def test_an_image_must_fit_a_recorder() -> None:
 def test_a_half_life_of_nothing_is_told(collected_share: float, half_life_s: float | None) -> None:
     objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
     told = usual_mistakes(replace(optical(), objective=objective))
-    is_told = any("half_life_s changes nothing" in one for one in told)
+    is_told = any("half_life_s has no effect" in one for one in told)
     assert is_told == (collected_share == 1.0 and half_life_s is not None)
 
 
@@ -165,7 +165,7 @@ def test_targets_at_sea_are_told_and_how_they_would_be_on_land() -> None:
     assert "with latitude and longitude swapped" in warning
     assert usual_mistakes(of_places(*ATLANTIC_COAST)) == ()
     (warning,) = usual_mistakes(of_places(*ATLANTIC))
-    assert "13 of 14 targets are at sea, 't0' first" in warning
+    assert "13 of 14 targets are at sea, the first of them 't0'" in warning
     assert "swapped" not in warning
 
 

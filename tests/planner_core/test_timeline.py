@@ -94,7 +94,7 @@ def test_overlap_is_seen_past_a_short_task_inside_a_long_one() -> None:
     timeline = judge(problem, 0, 1, 2)
     assert codes(timeline) == ["overlap", "overlap"]
     assert [(v.needed, v.available) for v in timeline.violations] == [(0.0, -180.0), (0.0, -100.0)]
-    assert timeline.violations[0].detail == "It starts 180.000 s before the task ahead of it ends."
+    assert timeline.violations[0].detail == "It starts 180.000 s before the previous task ends."
     assert timeline.reward == 0.0
 
 

@@ -152,8 +152,8 @@ def test_every_solver_keeps_what_a_mission_pins(solver: str, dynamics: Dynamics)
     [
         ({"target_id": "T"}, "pin_ambiguous", "opportunities"),
         ({"target_id": "T", "start": -1.0}, "pin_without_opportunity", "nearest one starts at"),
-        ({"opportunity_id": "o999999"}, "pin_without_opportunity", "no opportunity like this"),
-        ({"opportunity_id": "seventeen"}, "pin_without_opportunity", "no opportunity like this"),
+        ({"opportunity_id": "o999999"}, "pin_without_opportunity", "no such opportunity"),
+        ({"opportunity_id": "seventeen"}, "pin_without_opportunity", "no such opportunity"),
         ({"target_id": "none"}, "unknown_target", "'none'"),
         ({"target_id": "T", "satellite_id": "none"}, "unknown_satellite", "'none'"),
         ({}, "value_out_of_range", "target_id"),

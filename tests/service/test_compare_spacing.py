@@ -70,7 +70,7 @@ def test_what_is_wrong_is_told_by_its_place(
     scenario: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["compare-spacing", str(scenario), "--solver", "magic"]) == WRONG_INPUT
-    assert capsys.readouterr().err.startswith("slewline: --solver: No solver is called 'magic'")
+    assert capsys.readouterr().err.startswith("slewline: --solver: There is no solver 'magic'")
     content = json.loads(scenario.read_text())
     content["targets"][3]["lat_deg"] = 95.0
     scenario.write_text(json.dumps(content))

@@ -287,7 +287,7 @@ def test_old_elements_are_a_warning(client: httpx.Client) -> None:
 def test_a_half_life_without_a_share_that_ages_is_a_warning(client: httpx.Client) -> None:
     asked = question(client, objective={"half_life_s": 3600})
     (warning,) = post(client, PATH, asked)["warnings"]
-    assert "half_life_s changes nothing" in warning
+    assert "half_life_s has no effect" in warning
     asked["objective"]["collected_share"] = 0.5
     assert post(client, PATH, asked)["warnings"] == []
 

@@ -63,7 +63,8 @@ class WholeProgram:
                     phase="solve",
                     fraction=1.0,
                     reward=best.reward,
-                    message="The program is too large for HiGHS: the plan it would start from.",
+                    message="The program is too large for HiGHS: returning the plan it would "
+                    "start from.",
                 )
             )
             return best.solution()

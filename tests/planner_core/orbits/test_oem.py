@@ -183,7 +183,7 @@ def test_a_horizon_outside_the_span_names_the_satellite() -> None:
     beyond = Horizon(start=HORIZON.start, end=HORIZON.end + timedelta(hours=1))
     flown = satellite(read_oem(lines(*states())))
     mission = replace(SCENARIO, horizon=beyond, satellites=(flown,))
-    with pytest.raises(InvalidScenario, match="is usable 2018-12-31T23:50:00Z to") as caught:
+    with pytest.raises(InvalidScenario, match="is usable from 2018-12-31T23:50:00Z to") as caught:
         check_propagation(mission)
     assert caught.value.fault.pointer == "/satellites/0"
     check_propagation(replace(mission, horizon=HORIZON))

@@ -71,7 +71,7 @@ def test_times_and_sensor_types_of_targets_go_all_the_way(mission: Mission) -> N
     assert (taken["start"], taken["end"]) == (actions[10]["start"], end)
     for name, setting, words in (
         (late, "due", "between its release and due times"),
-        (typed, "sensor_type", "none that carries its sensor type"),
+        (typed, "sensor_type", "none with its sensor type"),
     ):
         assert (again[name]["reason"]["code"], again[name]["reason"]["certainty"]) == (
             "no_access", "proven",
