@@ -123,7 +123,7 @@ def _watch(process: BaseProcess, pipe: Connection[Any, Any], most_mb: float) -> 
             process.join()
             return False
         if (now_mb := held_mb(process.pid)) > most_mb:
-            log.warning("the process for heavy work held %.0f MB and is ended", now_mb)
+            log.warning("the process for heavy work used %.0f MB and is being ended", now_mb)
             process.kill()
             process.join()
     return True

@@ -78,8 +78,8 @@ def listen(host: str, port: int) -> socket.socket:
         listener = socket.create_server(address[:2], family=family, backlog=2048)
     except OSError as error:
         raise CannotServe(
-            f"Cannot listen on {host} port {port}: {error.strerror}. "
-            "Give another --port; 0 takes a free one."
+            f"Cannot listen on {host} port {port}: {error.strerror}. Give another --port; 0 picks "
+            "a free one."
         ) from error
     # Connections inherit this option. asyncio sets it only if a socket names its protocol, and
     # without it each answer's body waits for the client's delayed acknowledgement (40 ms).

@@ -136,7 +136,7 @@ class Settings(BaseSettings):
     def _check_origins(cls, value: str) -> str:
         for origin in value.replace(",", " ").split():
             if not _ORIGIN.fullmatch(origin):
-                raise ValueError(f"{origin!r} is no origin such as https://ops.example")
+                raise ValueError(f"{origin!r} is not an origin such as https://ops.example")
         return value
 
     @field_serializer("api_keys")

@@ -23,7 +23,7 @@ _KEPT_JOBS = 2
 class Explainer(Background):
     """Explains targets in the background; the most recent jobs stay compiled."""
 
-    _kept, _told = 200, "The explanation is being worked out."
+    _kept, _told = 200, "The explanation is being computed."
 
     def __init__(self) -> None:
         super().__init__()

@@ -98,7 +98,7 @@ def records_of_json(data: bytes) -> Records:
     try:
         document = json.loads(data)
     except (ValueError, RecursionError) as error:
-        return Records(faults=(Fault(code="malformed_json", detail=f"No JSON: {error}"[:200]),))
+        return Records(faults=(Fault(code="malformed_json", detail=f"Not JSON: {error}"[:200]),))
     records: list[Record] = []
     try:
         for number, satellite in enumerate(_list(document, "satellites", "")):
@@ -122,7 +122,7 @@ def _list(owner: object, name: str, pointer: str) -> list[Any]:
 def _record(satellite: Mapping[str, Any], action: object, pointer: str, position: int) -> Record:
     own = f"{pointer}/actions/{position}"
     if not isinstance(action, dict):
-        raise InvalidScenario("invalid_value", "An action is an object", pointer=own)
+        raise InvalidScenario("invalid_value", "An action must be an object", pointer=own)
     fields = {name: action[name] for name in _REQUIRED[1:] if name in action}
     pointers = {name: f"{own}/{name}" for name in _REQUIRED} | {"": own}
     pointers["satellite_id"] = f"{pointer}/id"

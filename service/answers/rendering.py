@@ -140,7 +140,7 @@ class Wording:
         if self.scenario.forecast is not None:
             table, alone = self.problem.opportunities, np.array([row])
             clear = float(clear_probabilities(self.scenario, table, alone)[0])
-            sky = f" (the sky is clear with {100.0 * clear:.0f} %)"
+            sky = f" (probability of a clear sky: {100.0 * clear:.0f} %)"
         return f" An image then would be worth {self.problem.worth[row]:.3g} of {reward:g}{sky}."
 
     def _change(self, change: Change) -> Json:

@@ -63,7 +63,7 @@ class Asked:
 class Variations(Background):
     """Computes changed scenarios in the background."""
 
-    _kept, _told = 8, "The change is being worked out."
+    _kept, _told = 8, "The change is being computed."
 
     def get(self, asked: Asked, described: Described) -> Variation:
         """Return the changed scenario; 503 ``still_computing`` if that takes long.

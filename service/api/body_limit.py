@@ -42,7 +42,7 @@ class BodyLimit:
         headers = Headers(scope=scope)
         coding = headers.get("content-encoding", "identity").strip().lower()
         if coding not in ("", "identity"):
-            detail = f"Content-Encoding is {coding[:80]!a}; send the body as it is."
+            detail = f"Content-Encoding is {coding[:80]!a}; send the body unencoded."
             accepted = {"Accept-Encoding": "identity"}
             raise ServiceError("unsupported_media_type", detail, headers=accepted)
         declared = headers.get("content-length", "")
@@ -95,7 +95,7 @@ class _InTime:
             async with asyncio.timeout(min(self._left_s, PART_WITHIN_S)):
                 message = await receive()
         except TimeoutError:
-            raise HTTPException(408, "The body did not come in time.") from None
+            raise HTTPException(408, "The body did not arrive in time.") from None
         # Only waiting counts, not the time that the service takes to process a part.
         self._left_s -= self._clock.time() - began_s
         self._is_whole = not message.get("more_body", False)

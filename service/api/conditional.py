@@ -17,7 +17,7 @@ M = TypeVar("M", bound=BaseModel)
 R = TypeVar("R")
 
 NOT_MODIFIED: Final[dict[int | str, dict[str, Any]]] = {
-    304: {"description": "`If-None-Match` names what there is: nothing has changed."}
+    304: {"description": "`If-None-Match` names the current version: nothing has changed."}
 }
 """For ``responses=`` of every route that may answer 304."""
 
@@ -100,7 +100,7 @@ def require_match(call: Call, etag: str) -> None:
     if asked is not None and not matches_strongly(asked, etag):
         raise ServiceError(
             "precondition_failed",
-            f"If-Match is {asked[:200]}, but this is {etag} by now: somebody has changed it.",
+            f"If-Match is {asked[:200]}, but the current ETag is {etag}: it has been changed.",
             headers={"ETag": etag},
         )
 

@@ -118,7 +118,7 @@ def require_media_type(request: Request, *allowed: str) -> str:
         said = media_type or "missing"
         raise ServiceError(
             "unsupported_media_type",
-            f"Content-Type is {said}; this call takes {', '.join(allowed)}.",
+            f"Content-Type is {said}; this call accepts {', '.join(allowed)}.",
             headers={"Accept-Post": ", ".join(allowed)},
         )
     return media_type
@@ -148,7 +148,7 @@ async def check_request(request: Request) -> None:
         if times > 1
     ]
     if not all(map(is_plain, (request.scope["path"], *request.query_params.values()))):
-        detail = "A path or parameter holds characters that no text may hold."
+        detail = "A path or parameter contains characters that are not allowed."
         faults.append(Fault(code="invalid_value", detail=detail))
     require_none(faults)
     if route.body_field is not None and await request.body():

@@ -152,7 +152,7 @@ def _http_detail(request: Request, error: HTTPException) -> str:
         case 404:
             return f"There is nothing at {request.url.path}."
         case 405:
-            return f"{request.method} is not possible at {request.url.path}."
+            return f"{request.method} is not allowed at {request.url.path}."
     return error.detail
 
 
@@ -174,7 +174,7 @@ def _on_bug(request: Request, error: Exception) -> JSONResponse:
     return problem(
         request,
         "internal_error",
-        f"The service failed; its log has request {request.state.request_id}.",
+        f"The service failed; see request {request.state.request_id} in its log.",
         # This answer is made outside the middleware that adds headers.
         headers={"X-Request-ID": request.state.request_id} | SECURITY_HEADERS,
     )

@@ -122,7 +122,7 @@ class Guard:
         if wait_s > 0.0:
             raise ServiceError(
                 "rate_limited",
-                f"Too many requests; the next one is possible in {wait_s:.3f} s.",
+                f"Too many requests; the next one is allowed in {wait_s:.3f} s.",
                 headers={"Retry-After": str(math.ceil(wait_s))},
             )
 

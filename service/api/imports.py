@@ -16,7 +16,7 @@ from service.wire.imports import Imported, RejectedRow
 BYTES: Final[dict[str, Any]] = {
     "type": "string",
     "format": "binary",
-    "description": "A file of any of these forms; its content tells which.",
+    "description": "A file in any of these formats, recognised by its content.",
 }
 """The schema of a file whose form is detected from its content."""
 

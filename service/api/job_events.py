@@ -35,8 +35,8 @@ _LOOK_EVERY_S: Final = 0.1
     "/{job_id}/events",
     response_class=StreamingResponse,
     responses={
-        200: {"content": {"text/event-stream": {}}, "description": "One `job` event a change."},
-        204: {"description": "The job is final and `Last-Event-ID` is its end: do not reconnect."},
+        200: {"content": {"text/event-stream": {}}, "description": "One `job` event per change."},
+        204: {"description": "The job is final, `Last-Event-ID` its last event: do not reconnect."},
         **problem_responses(404),
     },
 )

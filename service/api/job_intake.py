@@ -151,7 +151,7 @@ def limits_of(limits: LimitsIn, settings: Settings) -> dict[str, float]:
         raise refuse_one("value_out_of_range", detail, "/limits/time_s")
     memory_mb = settings.default_memory_mb if limits.memory_mb is None else limits.memory_mb
     if memory_mb > settings.max_memory_mb:
-        detail = f"{memory_mb} MB are more than the {settings.max_memory_mb} that a job may hold."
+        detail = f"{memory_mb} MB is more than the {settings.max_memory_mb} MB that a job may use."
         raise refuse_one("value_out_of_range", detail, "/limits/memory_mb")
     return {"time_s": time_s, "memory_mb": memory_mb}
 
@@ -166,7 +166,7 @@ def require_room(session: Session, call: Call, num_jobs: int = 1) -> None:
         if number + num_jobs > limit:
             raise ServiceError(
                 "queue_full",
-                f"At most {limit} jobs{whose} may wait, and there is no room for {num_jobs}.",
+                f"At most {limit} jobs{whose} may wait, and there is no room for {num_jobs} more.",
                 headers={"Retry-After": str(_QUEUE_FULL_S)},
             )
 
@@ -194,7 +194,7 @@ def _left_by(job: JobRow, answer: T | None) -> T:
         headers = {"Retry-After": str(SOON_S)}
         raise ServiceError("not_ready", f"The job is {job.state}.", headers=headers)
     why = job.error["code"] if job.error else "it was stopped before it had a plan"
-    raise ServiceError("not_ready", f"The job is {job.state} and left no answer: {why}.")
+    raise ServiceError("not_ready", f"The job is {job.state} and has no answer: {why}.")
 
 
 def shown_job(session: Session, job: JobRow) -> JobOut:

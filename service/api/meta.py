@@ -62,7 +62,7 @@ def ready(call: CallDep) -> Ready:
     workers = _recent_workers(call.database)
     _ask_queue(call.request.app.state.queue)
     if not workers:
-        raise ServiceError("not_live", "No worker has been heard of in the last 30 seconds.")
+        raise ServiceError("not_live", "No worker has reported in the last 30 seconds.")
     return Ready(workers=len(workers), last_heartbeat=max(workers))
 
 

@@ -54,7 +54,7 @@ class CallCounters:
         )
         self._seconds = Histogram(
             "slewline_http_request_seconds",
-            "Seconds until the answer of a call was sent; streams and waits included.",
+            "Seconds until the answer to a call was sent, including streams and waits.",
             ("method", "route"),
             buckets=_BUCKETS_S,
             registry=self.registry,
@@ -96,7 +96,9 @@ class _Collected:
 
 
 def _families(database: Database) -> Iterator[Metric]:
-    yield InfoMetricFamily("slewline_build", "What runs.", {"version": planner_core.__version__})
+    yield InfoMetricFamily(
+        "slewline_build", "Version of the service.", {"version": planner_core.__version__}
+    )
     stored: list[Metric] = []
     try:
         with database.reading() as session:
@@ -104,7 +106,7 @@ def _families(database: Database) -> Iterator[Metric]:
     except sa.exc.DatabaseError:
         pass  # the next family reports it
     up = 1.0 if stored else 0.0
-    yield GaugeMetricFamily("slewline_database_up", "1 where the database answers.", up)
+    yield GaugeMetricFamily("slewline_database_up", "1 if the database answers, else 0.", up)
     yield from stored
 
 
@@ -119,7 +121,7 @@ def _of_jobs(session: Session) -> Iterator[Metric]:
     )
     times = SummaryMetricFamily(
         "slewline_job_seconds",
-        "From first start to end of the jobs that have ended.",
+        "Time from first start to end of the jobs that have ended.",
         labels=["solver", "state", "termination"],
     )
     for labels, num_jobs, total_s in store.job_times(session):
@@ -133,13 +135,13 @@ def _of_jobs(session: Session) -> Iterator[Metric]:
 def _of_others(session: Session) -> Iterator[Metric]:
     yield _gauge(
         "slewline_worker_heartbeat_age_seconds",
-        "Since the last sign of life of each worker of the last day.",
+        "Time since the last sign of life of each worker seen in the last day.",
         "worker",
         store.heartbeat_age_s(session),
     )
     orbits = GaugeMetricFamily(
         "slewline_orbit_age_seconds",
-        "Since the epoch of the newest elements of each satellite planned in the last 7 days.",
+        "Time since the epoch of the newest elements of each satellite planned in the last 7 days.",
         labels=["satellite_id", "name"],
     )
     for labels, age_s in store.orbit_ages(session):
@@ -147,7 +149,7 @@ def _of_others(session: Session) -> Iterator[Metric]:
     yield orbits
     yield _gauge(
         "slewline_webhook_deliveries",
-        "Messages of webhooks by state; ended ones of the last 30 days.",
+        "Webhook messages by state; of those that ended, only the last 30 days.",
         "state",
         store.num_deliveries(session),
     )

@@ -268,7 +268,7 @@ _PAGE = """<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>{style}</style></head><body>
 <h1>{title} {version}</h1><p>{description}</p>
-<p>The same as a machine reads it: <a href="/openapi.json">/openapi.json</a> (OpenAPI 3.1).</p>
+<p>The same in machine-readable form: <a href="/openapi.json">/openapi.json</a> (OpenAPI 3.1).</p>
 <h2>Calls</h2>
 {operations}
 <h2>Shapes</h2>

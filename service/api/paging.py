@@ -78,7 +78,7 @@ def decode_cursor(cursor: str) -> str:
 
 def invalid_cursor() -> ServiceError:
     """Return the error for a cursor that this list has not given."""
-    return ServiceError("invalid_cursor", "The cursor is not one that this list has given.")
+    return ServiceError("invalid_cursor", "The cursor was not issued by this list.")
 
 
 async def _paging(
@@ -147,12 +147,14 @@ StationQuery = Annotated[
     str | None, Query(max_length=200, description="Only with this ground station (its id).")
 ]
 NameQuery = Annotated[
-    str | None, Query(max_length=200, description="Only names with this text, in any case.")
+    str | None,
+    Query(max_length=200, description="Only names that contain this text, ignoring case."),
 ]
 _From = Annotated[
-    Instant | None, Query(alias="from", description="Only what was stored then or later.")
+    Instant | None,
+    Query(alias="from", description="Only what was stored at this instant or later."),
 ]
-_To = Annotated[Instant | None, Query(description="Only what was stored before then.")]
+_To = Annotated[Instant | None, Query(description="Only what was stored before this instant.")]
 
 
 @dataclass(frozen=True, slots=True)

@@ -115,7 +115,7 @@ def _telemetry(
     """Return each satellite's newest state, if it is no older than the one the plan began with."""
     faults = faults_of_states(session, plan, body.states, "/states")
     faults += [
-        Fault(code="value_out_of_range", detail="A state cannot be of later than now.",
+        Fault(code="value_out_of_range", detail="A state cannot be later than now.",
               pointer=f"/states/{i}/at")
         for i, state in enumerate(body.states)
         if state.at > now

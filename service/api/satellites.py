@@ -223,7 +223,7 @@ def _require_same_object(row: SatelliteRow, norad_cat_id: int, body: OrbitIn) ->
     # An ephemeris has no catalogue number.
     if norad_cat_id == row.norad_cat_id or body.oem is not None:
         return
-    detail = f"The elements are of {norad_cat_id}, the satellite is {row.norad_cat_id}."
+    detail = f"The elements are for {norad_cat_id}, but the satellite is {row.norad_cat_id}."
     pointer = "/tle" if body.tle is not None else "/omm/NORAD_CAT_ID"
     raise refuse_one("different_satellite", detail, pointer)
 

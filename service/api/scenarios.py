@@ -53,7 +53,7 @@ _KINDS: dict[str, int] = {"collect": COLLECT, "contact": CONTACT}
 @router.post(
     "",
     status_code=201,
-    responses={200: {"model": ScenarioOut, "description": "The same question is stored already."}},
+    responses={200: {"model": ScenarioOut, "description": "The same scenario is stored already."}},
 )
 def create_scenario(body: ScenarioIn, call: CallDep, once: OnceDep) -> ScenarioOut:
     """Freeze a planning question: everything it names is copied into it.

@@ -45,11 +45,11 @@ class Sites:
         if not self._is_ours(host):
             raise ServiceError(
                 "misdirected_request",
-                f"{host[:80]!a} is no name of this service (SLEWLINE_ALLOWED_HOSTS).",
+                f"{host[:80]!a} is not a name of this service (SLEWLINE_ALLOWED_HOSTS).",
             )
         if method not in READING and self._is_foreign(host, headers):
             raise ServiceError(
-                "foreign_origin", "A page of another site may not change anything here."
+                "foreign_origin", "A page from another site may not change anything here."
             )
 
     def _is_ours(self, host: str) -> bool:

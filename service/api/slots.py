@@ -89,6 +89,6 @@ class Slots:
 def _too_busy() -> ServiceError:
     return ServiceError(
         "too_busy",
-        "So much of this kind is under way already, for this owner or in all.",
+        "Too many requests of this kind are in progress, for this owner or in total.",
         headers={"Retry-After": str(_ASK_AGAIN_S)},
     )

@@ -56,7 +56,9 @@ async def _check_call(call: CallDep) -> None:
         raise refuse_one("invalid_value", "The header Host names no host.") from None
     limit = request.query_params.get("limit", "1")
     if not (limit.isdecimal() and len(limit) < 9 and 1 <= int(limit) <= _MOST_ON_A_PAGE):
-        raise refuse_one("value_out_of_range", f"limit is a number from 1 to {_MOST_ON_A_PAGE}.")
+        raise refuse_one(
+            "value_out_of_range", f"limit must be a number from 1 to {_MOST_ON_A_PAGE}."
+        )
 
 
 async def _check_product(product_id: str, request: Request, call: CallDep) -> None:
@@ -65,7 +67,7 @@ async def _check_product(product_id: str, request: Request, call: CallDep) -> No
     if request.method != "POST":
         return
     if len(await request.body()) > MOST_BYTES:
-        raise ServiceError("body_too_large", f"A body here has at most {MOST_BYTES} bytes.")
+        raise ServiceError("body_too_large", f"A body here may have at most {MOST_BYTES} bytes.")
     model = OrderIn if request.url.path.endswith("/orders") else SearchIn
     request.state.asked = validated(model, await request.json())
 

@@ -137,7 +137,7 @@ class _AskIn(Body):
             named, number = part.args
             limit = LIMITS.get((named.property, part.op))
             if limit is None or limit in found:
-                detail = f"{named.property} {part.op} cannot be asked for here, or twice."
+                detail = f"{named.property} {part.op} is not supported here, or is given twice."
                 raise refuse_one("invalid_value", detail, "/filter")
             found[limit] = number
         return found
@@ -159,5 +159,5 @@ class OrderIn(_AskIn):
 def _span(text: str) -> Span:
     parts = text.split("/")
     if len(parts) != 2:
-        raise ValueError("two instants with a slash between them are needed")
+        raise ValueError("two instants separated by a slash are needed")
     return parse_instant(parts[0]), parse_instant(parts[1])

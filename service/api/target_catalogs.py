@@ -62,8 +62,8 @@ _REQUEST_BODY: Final = request_body(
         "text/csv": {
             "type": "string",
             "description": f"A header with id, lat_deg, lon_deg and any of {', '.join(_OPTIONAL)}; "
-            "lat, latitude, lon, lng and longitude are taken as well, and city for name. An empty "
-            "cell means the default.",
+            "lat, latitude, lon, lng and longitude are accepted as well, and city for name. An "
+            "empty cell means the default.",
         },
     }
 )

@@ -99,7 +99,7 @@ def test_webhook(webhook_id: str, once: OnceDep, call: CallDep) -> DeliveryOut:
         if outbox.num_pending(session, row.id, _TEST) >= _MOST_TESTS:
             raise ServiceError(
                 "too_many_deliveries",
-                f"{_MOST_TESTS} tests of this webhook wait to be sent.",
+                f"{_MOST_TESTS} tests of this webhook are already waiting to be sent.",
                 headers={"Retry-After": str(_TEST_AGAIN_S)},
             )
         data = TestData(message="This is a test of the webhook.", webhook_id=row.id)
@@ -147,14 +147,15 @@ def _require_room(session: Session, owner: str) -> None:
     own = sa.select(sa.func.count()).select_from(WebhookRow).where(WebhookRow.owner == owner)
     if session.execute(own).scalar_one() >= MOST_OF_AN_OWNER:
         raise ServiceError(
-            "too_many_webhooks", f"An owner may have {MOST_OF_AN_OWNER} webhooks; delete one."
+            "too_many_webhooks",
+            f"An owner may have at most {MOST_OF_AN_OWNER} webhooks; delete one.",
         )
 
 
 def _require_enabled(row: WebhookRow) -> None:
     if row.disabled_at is not None:
         raise ServiceError(
-            "webhook_disabled", f"{row.disabled_because} Make a new webhook to go on."
+            "webhook_disabled", f"{row.disabled_because} Create a new webhook to continue."
         )
 
 

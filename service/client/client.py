@@ -125,7 +125,7 @@ def _address(url: str) -> httpx.URL:
 def _sendable(key: str) -> str:
     # httpx would quote the key in its error message.
     if not _KEY.fullmatch(key):
-        raise ValueError("the API key has characters that no key has, a line's end perhaps")
+        raise ValueError("the API key contains invalid characters, perhaps a line break")
     return key
 
 

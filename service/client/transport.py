@@ -233,7 +233,7 @@ def parsed(shape: type[M], text: str | bytes, what: str) -> M:
     try:
         return read(shape, text)
     except ValidationError as error:
-        raise UnexpectedAnswer(f"{what}: not as the API says: {error}") from error
+        raise UnexpectedAnswer(f"{what}: not the answer that the API specifies: {error}") from error
 
 
 @contextmanager

@@ -84,9 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     backup.add_argument("file", type=Path, metavar="FILE", help="a new file")
     _add_database(backup)
 
-    demo = _command(
-        commands, "demo", "demo:demo", "plan a real-size mission and print what came out"
-    )
+    demo = _command(commands, "demo", "demo:demo", "plan a real-size mission and print the results")
     demo.add_argument("--serve", action="store_true", help="keep serving afterwards")
     demo.add_argument("--out", type=Path, default=Path("demo-output"), help="folder for timelines")
 
@@ -95,18 +93,18 @@ def _parser() -> argparse.ArgumentParser:
     _add_search(solve)
 
     check = _command(
-        commands, "check", "check:check", "have the referee judge a timeline of any origin"
+        commands, "check", "check:check", "have the referee judge a timeline from any source"
     )
     check.add_argument("scenario", type=Path, metavar="SCENARIO.json")
     check.add_argument("timeline", type=_timeline_file, metavar="TIMELINE.{json,csv}")
 
     spacing = _command(
         commands, "compare-spacing", "compare_spacing:compare_spacing",
-        "see what more starts in each access gain on a scenario file",
+        "show what more starts in each access gain for a scenario file",
     )  # fmt: skip
     spacing.add_argument(
         "--spacing-s", action="append", type=_positive, metavar="SECONDS",
-        help="between the starts of an access; may be repeated (60, 30 and 15)",
+        help="time between the starts in an access; may be repeated (60, 30 and 15)",
     )  # fmt: skip
     spacing.add_argument("scenario", type=Path, metavar="SCENARIO.json")
     _add_search(spacing, solver="certified", time_s=60.0, out="write the table here, as CSV")
@@ -143,7 +141,7 @@ def _add_database(parser: argparse.ArgumentParser) -> None:
 def _add_keys(parser: argparse.ArgumentParser) -> None:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     create = _command(
-        commands, "create", "key_commands:create_key", "make a key and print it, this once"
+        commands, "create", "key_commands:create_key", "make a key and print it, only this once"
     )
     create.add_argument("--name", required=True, type=_plain_name, help="what the key is for")
     create.add_argument("--owner", required=True, type=_plain_name, help="whose jobs it sees")
@@ -154,7 +152,7 @@ def _add_keys(parser: argparse.ArgumentParser) -> None:
         commands, "list", "key_commands:list_keys", "list all keys, without their secrets"
     )
     _add_database(listing)
-    revoke = _command(commands, "revoke", "key_commands:revoke_key", "make a key worthless at once")
+    revoke = _command(commands, "revoke", "key_commands:revoke_key", "revoke a key at once")
     revoke.add_argument("key_id", metavar="ID", help="the twelve digits after slw_")
     _add_database(revoke)
 
@@ -176,23 +174,23 @@ def _add_plan(commands: Any) -> None:
     about = "have a service plan a scenario, and follow it"
     parser = _command(commands, "plan", "plan:plan", about)
     parser.add_argument("scenario", type=Path, nargs="?", metavar="SCENARIO.json")
-    parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario, not a file")
+    parser.add_argument("--scenario-id", metavar="ID", help="a stored scenario instead of a file")
     _add_search(parser)
     _add_service(parser)
     parser.add_argument("--label", help="a name for the job")
-    parser.add_argument("--priority", type=int, help="0 to 9, the most urgent (5)")
+    parser.add_argument("--priority", type=int, help="0 to 9; 9 is the most urgent (5)")
 
 
 def _add_replan(commands: Any) -> None:
     about = "have a service replan after what happened"
     parser = _command(commands, "replan", "plan:replan", about)
-    parser.add_argument("plan_id", metavar="PLAN", help="the id of the plan that goes on")
+    parser.add_argument("plan_id", metavar="PLAN", help="the id of the plan to replan")
     parser.add_argument(
         "happened", type=Path, nargs="?", metavar="HAPPENED.json",
-        help="outages, executions, promises, add_targets ..., as the API takes them",
+        help="outages, executions, promises, add_targets ..., as in the API",
     )  # fmt: skip
     parser.add_argument(
-        "--now", metavar="INSTANT", help="what starts before it stays (the time at the service)"
+        "--now", metavar="INSTANT", help="actions that start before it stay (the service's time)"
     )
     parser.add_argument("--name", help="a name for the new plan")
     parser.add_argument("--time-s", type=_positive, help="seconds after which the search stops")

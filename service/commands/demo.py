@@ -49,7 +49,7 @@ def demo(options: argparse.Namespace) -> int:
             raise Failed(str(error)) from error
         if options.serve:
             print(f"\nStill serving at {url} (the dashboard; calls: {url}/docs).", flush=True)
-            print("Ctrl-C ends it.", flush=True)
+            print("Press Ctrl-C to stop.", flush=True)
             with suppress(KeyboardInterrupt):
                 while True:
                     time.sleep(3600.0)

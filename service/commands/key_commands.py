@@ -29,8 +29,8 @@ def create_key(options: argparse.Namespace) -> int:
         BY_COMMAND_LINE.record(session, "create", "key", key_id)
     print(token, flush=True)
     print(
-        f"This is key {key_id} of {options.owner}, good for {options.expires_days:g} days. "
-        "Keep it safe: it is not shown again.",
+        f"This is key {key_id} of {options.owner}, valid for {options.expires_days:g} days. Keep "
+        "it safe: it is not shown again.",
         file=sys.stderr,
     )
     return OK
@@ -59,7 +59,7 @@ def revoke_key(options: argparse.Namespace) -> int:
         is_known = key_store.has_key(session, key_id)
     if not is_known:
         raise WrongInput(f"there is no key {key_id!r}; see slewline keys list")
-    print(f"Key {key_id} is revoked." if is_new else f"Key {key_id} was revoked before.")
+    print(f"Key {key_id} is revoked." if is_new else f"Key {key_id} was already revoked.")
     return OK
 
 

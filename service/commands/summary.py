@@ -10,7 +10,7 @@ HEADER = (
     "capacities", "battery", "recorder", "search", "total", "validity",
 )  # fmt: skip
 LEGEND = (
-    "downlinked: targets whose image is on the ground, and what went down in recorder "
+    "downlinked: targets whose image is on the ground; capacities: data downlinked, in recorder "
     "capacities;\nbattery: lowest; recorder: highest; search and total: seconds."
 )
 

@@ -116,7 +116,7 @@ def check(
 def _with_hint(fault: Fault, fields: Mapping[str, object]) -> Fault:
     value = fields.get((fault.pointer or "").removeprefix("/"))
     if isinstance(value, str) and has_decimal_comma(value):
-        hint = "Write it with a point, or put semicolons between cells"
+        hint = "Write it with a decimal point, or separate cells with semicolons"
         return replace(fault, detail=f"{fault.detail} {hint}.")
     lat, lon = fields.get("lat_deg"), fields.get("lon_deg")
     if fault.pointer != "/lat_deg" or not isinstance(lat, float) or not isinstance(lon, float):
@@ -154,7 +154,7 @@ def read_csv(
         elif len(row[1]) != len(columns):
             detail = f"The line has {len(row[1])} cells, the header {len(columns)}."
             if table.delimiter == "," and len(row[1]) > len(columns):
-                detail += " Where commas are decimal signs, put semicolons between cells."
+                detail += " If commas are decimal signs, separate cells with semicolons."
             faults.append(Fault(code="malformed_csv", detail=detail, row=row[0]))
         else:
             cells = zip(columns, (cell.strip() for cell in row[1]), strict=True)
@@ -189,7 +189,7 @@ def open_table(data: bytes, required: Collection[str]) -> tuple[Table, int, list
         raise NoTable(first.code, first.detail, first.row)
     line, header = first
     if len(header) > MOST_COLUMNS:
-        detail = f"The header has {len(header)} columns; {MOST_COLUMNS} are the most."
+        detail = f"The header has {len(header)} columns; the limit is {MOST_COLUMNS}."
         raise NoTable("malformed_csv", detail, line)
     return table, line, column_names(header)
 
@@ -220,7 +220,7 @@ def faults_of_header(
                 Fault(code="malformed_csv", detail=f"Column {column!r} is given twice.", row=row)
             )
         elif column not in known and meant:
-            detail = f"There is no column {column!r}; {meant[0]!r} is meant?"
+            detail = f"There is no column {column!r}; did you mean {meant[0]!r}?"
             faults.append(Fault(code="unknown_field", detail=detail, row=row))
     lacking = [name for name in required if name not in columns]
     if lacking:
@@ -244,7 +244,7 @@ def read_json(data: bytes) -> Any:
     try:
         return json.loads(data.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise refuse_one("malformed_json", f"No JSON: {error}"[:200]) from None
+        raise refuse_one("malformed_json", f"Not JSON: {error}"[:200]) from None
 
 
 def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:
@@ -258,12 +258,12 @@ def read_geojson(data: bytes, known: Collection[str], *, most: int) -> Records:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        return Records(faults=(Fault(code="malformed_json", detail=f"No JSON: {error}"[:200]),))
+        return Records(faults=(Fault(code="malformed_json", detail=f"Not JSON: {error}"[:200]),))
     if not isinstance(document, dict) or document.get("type") != "FeatureCollection":
         return _no_collection("The body must be a FeatureCollection.", "")
     features = document.get("features")
     if not isinstance(features, list):
-        return _no_collection("A FeatureCollection has a list of features.", "/features")
+        return _no_collection("A FeatureCollection must have a list of features.", "/features")
     if not features:
         return Records(faults=(Fault(code="empty_file", detail="The collection is empty."),))
     if len(features) > most:
@@ -283,7 +283,7 @@ def _no_collection(detail: str, pointer: str) -> Records:
 
 def _feature(feature: object, pointer: str, known: Collection[str]) -> Record | Fault:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        return Fault(code="malformed_geojson", detail="This is no Feature.", pointer=pointer)
+        return Fault(code="malformed_geojson", detail="This is not a Feature.", pointer=pointer)
     geometry = feature.get("geometry")
     if not isinstance(geometry, dict) or geometry.get("type") != "Point":
         detail = "The geometry must be a Point."
@@ -291,7 +291,7 @@ def _feature(feature: object, pointer: str, known: Collection[str]) -> Record | 
     at = f"{pointer}/geometry/coordinates"
     position = geometry.get("coordinates")
     if not isinstance(position, list) or len(position) not in (2, 3):
-        detail = "A position is [longitude, latitude] or [longitude, latitude, altitude]."
+        detail = "A position must be [longitude, latitude] or [longitude, latitude, altitude]."
         return Fault(code="malformed_geojson", detail=detail, pointer=at)
     properties = feature.get("properties")
     fields: dict[str, Any] = dict(properties) if isinstance(properties, dict) else {}

@@ -86,5 +86,7 @@ def decoded(data: bytes) -> str | Fault:
     try:
         return data.decode("utf-16" if data.startswith(_WIDE) else "utf-8-sig")
     except UnicodeDecodeError as error:
-        detail = f"Byte {error.start} is no UTF-8. Save the file as UTF-8, as most programs offer."
+        detail = (
+            f"Byte {error.start} is not UTF-8. Save the file as UTF-8, which most programs offer."
+        )
         return Fault(code="not_utf8", detail=detail)

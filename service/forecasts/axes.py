@@ -19,9 +19,9 @@ _LAT_RATIO: Final = 2.0
 def fault_of_axes(lat_deg: Floats, lon_deg: Floats) -> Fault | None:
     """Return the fault of a grid's ascending axes, or None."""
     if lat_deg[0] < -90.0 or lat_deg[-1] > 90.0:
-        return _fault("latitudes lie between -90 and 90.")
+        return _fault("latitudes must lie between -90 and 90.")
     if lon_deg[-1] - lon_deg[0] > 360.0 or lon_deg[0] < -360.0 or lon_deg[-1] > 720.0:
-        return _fault("longitudes span at most 360 degrees.")
+        return _fault("longitudes may span at most 360 degrees.")
     steps_deg = np.diff(lat_deg)
     if len(steps_deg) and steps_deg.max() > _LAT_RATIO * steps_deg.min():
         return _fault(

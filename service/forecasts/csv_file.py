@@ -54,7 +54,7 @@ def read_csv(data: bytes) -> tuple[Field, list[str]]:
         )
     require_none(table.faults)
     field = _grid(table) if wanted is _GRID else _by_target(table)
-    return field, [f"Probabilities are kept to 1/{WHOLE:,}."]
+    return field, [f"Probabilities are rounded to 1/{WHOLE:,}."]
 
 
 class _Table:
@@ -111,7 +111,7 @@ def _number(cell: str, least: float, most: float) -> float:
     try:
         value = float(cell)
     except ValueError:
-        raise ValueError(f"{cell[:40]!r} is no number.") from None
+        raise ValueError(f"{cell[:40]!r} is not a number.") from None
     if not (math.isfinite(value) and least <= value <= most):
         raise ValueError(f"{value:g} is not between {least:g} and {most:g}.")
     return value
@@ -130,13 +130,13 @@ def _grid(table: _Table) -> Grid:
     shape = tuple(len(axis) for axis in axes)
     number = math.prod(shape)
     if (twice := _first_twice(places, shape)) is not None:
-        detail = "This instant and place are given twice."
+        detail = "This instant and position are given twice."
         raise refuse_one("invalid_value", detail, row=table.lines[twice])
     if number > len(table.lines):
         raise refuse_one(
             "invalid_value",
             f"The grid is not full: {shape[0]} instants, {shape[1]} latitudes and {shape[2]} "
-            f"longitudes make {number} values, and there are {len(table.lines)}.",
+            f"longitudes make {number} values, but there are {len(table.lines)}.",
         )
     if (fault := fault_of_axes(axes[1], axes[2])) is not None:
         raise refuse([fault])

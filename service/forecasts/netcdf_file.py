@@ -83,10 +83,10 @@ def _refused(detail: str) -> ServiceError:
 def _require_plain(file: h5py.File) -> None:
     for name in file:
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise _refused(f"{name[:100]!r} is a link; the file must hold its data itself.")
+            raise _refused(f"{name[:100]!r} is a link; the file must contain its data itself.")
         item = file[name]
         if isinstance(item, h5py.Group):
-            raise _refused(f"{name[:100]!r} is a group; variables must stand at the top.")
+            raise _refused(f"{name[:100]!r} is a group; variables must be at the top level.")
         if isinstance(item, h5py.Dataset) and (item.is_virtual or item.external):
             raise _refused(f"The data of {name[:100]!r} lie in another file.")
         chunk = getattr(item, "chunks", None)
@@ -148,13 +148,13 @@ class _Reading:
             if size == 0:
                 raise _refused(f"The axis {name!r} is empty.")
             if name not in self._axis_of.values() and size > 1:
-                raise _refused(f"There is no telling what the axis {name!r} means.")
+                raise _refused(f"It is not clear what the axis {name!r} means.")
         member = self._axis_of["member"]
         number = math.prod(shape.values())
         kept = number // (shape[member] if member else 1)
         if kept > MOST_VALUES or number > _MOST_READ:
             raise _refused(
-                f"The file has {kept} values; {MOST_VALUES} are the most. Cut it to the region and "
+                f"The file has {kept} values; the limit is {MOST_VALUES}. Cut it to the region and "
                 "the days that are planned."
             )
 
@@ -165,7 +165,7 @@ class _Reading:
             raise _refused(f"The axis {name!r} has no coordinates.")
         values = np.asarray(variable[...], dtype=np.float64)
         if not np.all(np.isfinite(values)):
-            raise _refused(f"The axis {name!r} has values that are no numbers.")
+            raise _refused(f"The axis {name!r} has values that are not numbers.")
         return values
 
     def _ascending(self, values: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], Longs]:
@@ -184,8 +184,8 @@ class _Reading:
         unit_s = _UNITS_S.get(unit) or _UNITS_S.get(unit.removesuffix("s"))
         if found is None or unit_s is None or calendar not in _CALENDARS:
             raise _refused(
-                f"The units of time must be such as 'hours since 2026-01-31 00:00', in the "
-                f"standard calendar; they are {units[:100]!r}, {calendar[:40]!r}."
+                "The units of time must be like 'hours since 2026-01-31 00:00', in the standard "
+                f"calendar; they are {units[:100]!r}, {calendar[:40]!r}."
             )
         try:
             origin = datetime(*(int(part or 0) for part in found.groups()[1:]), tzinfo=UTC)  # type: ignore[arg-type, misc]
@@ -249,10 +249,10 @@ class _Reading:
         mean = f", the mean of {shape[member]} members" if member else ""
         units = "in %" if self._is_percent() else "from 0 to 1"
         if not self._is_cover:
-            how = f"Variable {self._name!r} ({units}) is taken as it is{mean}."
+            how = f"Variable {self._name!r} ({units}) is used as it is{mean}."
         else:
             how = (
                 f"A clear sky's probability is 1 minus the total cloud cover, variable "
                 f"{self._name!r} ({units}){mean}: the share of the sky that is clear."
             )
-        return [how, f"Probabilities are kept to 1/{WHOLE:,}."]
+        return [how, f"Probabilities are rounded to 1/{WHOLE:,}."]

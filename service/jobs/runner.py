@@ -241,12 +241,12 @@ class _Run:
         if code == _UNKNOWN_EXIT:
             return Lost()
         how = f"signal {-code}" if code is not None and code < 0 else f"exit status {code}"
-        return Refused("solver_crashed", f"The solver's process ended by itself ({how}).")
+        return Refused("solver_crashed", f"The solver's process ended unexpectedly ({how}).")
 
     def _check_limits(self) -> Ending | None:
         now_mb = held_mb(self.process.pid)  # 0 if it has ended; its messages are still read
         if now_mb > self.limits.memory_mb:
-            detail = f"The solver held {now_mb:.0f} MB; its limit is {self.limits.memory_mb} MB."
+            detail = f"The solver used {now_mb:.0f} MB; its limit is {self.limits.memory_mb} MB."
             return Refused("memory_limit", detail)
         now_s = time.monotonic()
         if now_s >= self._expire_at_s:

@@ -110,7 +110,7 @@ def _checked(cls: type[Solver], field: Field[Any], value: object) -> object:
     if kind.choices:
         if not any(value == choice and type(value) is type(choice) for choice in kind.choices):
             allowed = ", ".join(repr(choice) for choice in kind.choices)
-            raise _refusal(field.name, "unknown_value", f"{value!r} is none of {allowed}.")
+            raise _refusal(field.name, "unknown_value", f"{value!r} is not one of {allowed}.")
         return value
     if kind.type is float and type(value) is int:
         value = float(value)

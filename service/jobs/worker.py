@@ -249,7 +249,7 @@ class Worker:
             with self._database.transaction() as session:
                 session.execute(sa.delete(WorkerRow).where(WorkerRow.id == self.id))
         except SQLAlchemyError as error:
-            _raise_unless_it_passes(error, "could not take leave")
+            _raise_unless_it_passes(error, "could not deregister")
         self._queue.close()
         self._database.close()
         remove_folder(self._held_in)

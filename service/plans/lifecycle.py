@@ -54,7 +54,11 @@ def move(session: Session, caller: Caller, plan: PlanRow, body: TransitionIn) ->
 def _require_fields(body: TransitionIn) -> None:
     """Refuse fields that do not apply to this transition, which would be silently ignored."""
     faults = [
-        Fault(code="invalid_value", detail=f"{name} goes with {wanted}.", pointer=f"/{name}")
+        Fault(
+            code="invalid_value",
+            detail=f"{name} applies only to the transition to {wanted}.",
+            pointer=f"/{name}",
+        )
         for name, wanted, is_given in (
             ("waivers", "approved", bool(body.waivers)),
             ("effective_from", "published", body.effective_from is not None),

@@ -71,4 +71,4 @@ def kind_of(code: str) -> ProblemKind:
     if known is not None:
         return known
     title = code.replace("_", " ").capitalize()
-    return ProblemKind(422, title, "The data is wrong in the place that the problem names.")
+    return ProblemKind(422, title, "The data is wrong at the location that the problem names.")

@@ -70,8 +70,8 @@ def start_tracing(settings: Settings, role: str) -> TracerProvider | None:
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
     except ImportError as error:
         raise CannotTrace(
-            "Traces are asked for (SLEWLINE_OTEL or OTEL_EXPORTER_OTLP_ENDPOINT), and what sends "
-            "them is not installed: pip install 'slewline[otel]', or set SLEWLINE_OTEL=false."
+            "Tracing is enabled (SLEWLINE_OTEL or OTEL_EXPORTER_OTLP_ENDPOINT), but its exporter "
+            "is not installed: pip install 'slewline[otel]', or set SLEWLINE_OTEL=false."
         ) from error
     named = os.environ.get("OTEL_SERVICE_NAME") or f"slewline-{role}"
     resource = Resource.create({"service.name": named, "service.version": planner_core.__version__})

@@ -257,7 +257,7 @@ def _of_today(model: type[M], body: dict[str, Any], pointer: str) -> M:
     except ValidationError as error:
         first = faults_of_validation(error, body)[0]
         name = body.get("name") or body["id"]
-        detail = f"What is stored of {name!r} has to be changed, {first.pointer}: {first.detail}"
+        detail = f"The stored {name!r} must be changed at {first.pointer}: {first.detail}"
         raise InvalidScenario(first.code, detail, pointer=pointer) from None
 
 

@@ -133,7 +133,7 @@ def _refuse_duplicates(body: PinsIn) -> None:
             text = pin if isinstance(pin, str) else pin.model_dump_json()
             if text in seen:
                 pointer = f"/pins/{kind}/{position}"
-                raise InvalidScenario("duplicate_pin", "It is listed before.", pointer=pointer)
+                raise InvalidScenario("duplicate_pin", "It is listed already.", pointer=pointer)
             seen.add(text)
 
 

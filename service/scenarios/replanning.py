@@ -222,7 +222,7 @@ def _faults_of_dropped(
             detail = f"Target {own_id!r} is imaged before freeze_until: it cannot be dropped."
             faults.append(Fault(code="invalid_value", detail=detail, pointer=pointer))
         elif own_id in promised:
-            detail = f"Target {own_id!r} is promised in the same breath."
+            detail = f"Target {own_id!r} is promised in the same request."
             faults.append(Fault(code="invalid_value", detail=detail, pointer=pointer))
     return faults
 

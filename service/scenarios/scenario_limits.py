@@ -35,7 +35,7 @@ class ScenarioLimits:
             detail = f"The horizon has {days:.2f} days; the limit is {self.horizon_days:g}."
             raise InvalidScenario("horizon_too_long", detail, pointer="/horizon/end")
         if num_targets > self.num_targets:
-            detail = f"The scenario has {num_targets} targets; {self.num_targets} are the most."
+            detail = f"The scenario has {num_targets} targets; the limit is {self.num_targets}."
             raise InvalidScenario("scenario_too_large", detail)
         product = num_satellites * num_targets * days
         if product > self.satellite_target_days:

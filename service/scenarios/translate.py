@@ -313,7 +313,7 @@ def _check_mask(mask: Sequence[Sequence[float]]) -> None:
         if not (before < azimuth <= 360.0 and -90.0 <= elevation <= 90.0):
             raise InvalidScenario(
                 "value_out_of_range",
-                "Azimuths ascend from 0 to 360, elevations lie between -90 and 90.",
+                "Azimuths must ascend from 0 to 360, elevations must lie between -90 and 90.",
                 pointer=f"/elevation_mask/{position}",
             )
         before = max(azimuth, 0.0)

@@ -52,12 +52,12 @@ def delete_job(session: Session, job: JobRow) -> None:
     """
     if job.state not in FINAL:
         raise ServiceError(
-            "invalid_transition", f"The job is {job.state}: cancel it, then it can be deleted."
+            "invalid_transition", f"The job is {job.state}: cancel it before deleting it."
         )
     made = sa.select(PlanRow.id).where(PlanRow.job_id == job.id)
-    _require_none(session, made, "The plan {!r} is made of this job.")
+    _require_none(session, made, "The plan {!r} was made from this job.")
     ran = sa.select(ComparisonRunRow.comparison_id).where(ComparisonRunRow.job_id == job.id)
-    _require_none(session, ran, "The comparison {!r} has this job as a run.")
+    _require_none(session, ran, "The comparison {!r} includes this job.")
     _delete_jobs(session, [job.id])
 
 
@@ -78,10 +78,10 @@ def delete_plan(session: Session, plan: PlanRow) -> None:
     """
     if plan.state in _KEPT_PLANS:
         raise ServiceError(
-            "invalid_transition", f"The plan is {plan.state}: withdraw it, then it can be deleted."
+            "invalid_transition", f"The plan is {plan.state}: withdraw it before deleting it."
         )
     changes = sa.select(PlanRow.id).where(PlanRow.parent_id == plan.id)
-    _require_none(session, changes, "The plan {!r} is a change of this.")
+    _require_none(session, changes, "The plan {!r} is a replan of this one.")
     for row in (ExecutionRow, PlanStateRow, PlanEventRow, PlanActionRow, PlanSatelliteRow):
         _delete(session, row, row.plan_id == plan.id)
     _delete(session, PlanRow, PlanRow.id == plan.id)
@@ -96,9 +96,9 @@ def delete_scenario(session: Session, scenario: ScenarioRow) -> None:
         ``in_use`` if a job or a comparison refers to it.
     """
     tried = sa.select(JobRow.id).where(JobRow.scenario_id == scenario.id)
-    _require_none(session, tried, "The job {!r} is of this scenario.")
+    _require_none(session, tried, "The job {!r} uses this scenario.")
     compared = sa.select(ComparisonRow.id).where(ComparisonRow.scenario_id == scenario.id)
-    _require_none(session, compared, "The comparison {!r} is of this scenario.")
+    _require_none(session, compared, "The comparison {!r} uses this scenario.")
     _delete_scenarios(session, [(scenario.id, scenario.sha256)])
 
 

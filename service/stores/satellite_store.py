@@ -63,8 +63,8 @@ def _require_new(session: Session, norad_cat_id: int) -> None:
     if rival is not None:
         raise ServiceError(
             "duplicate_norad_cat_id",
-            f"The satellite {rival.id!r} has the catalogue number {norad_cat_id}. "
-            "Send its new elements there, or import them.",
+            f"The satellite {rival.id!r} already has the catalogue number {norad_cat_id}. Send its "
+            "new elements there, or import them.",
         )
 
 

@@ -67,19 +67,19 @@ def require_good_url(url: str, *, private: bool) -> None:
         parts = urlsplit(url)
         host, _ = parts.hostname, parts.port
     except ValueError as error:
-        raise AddressRefused(f"{url!r} is no URL: {error}.") from None
+        raise AddressRefused(f"{url!r} is not a URL: {error}.") from None
     if len(url) > LONGEST_URL or not url.isascii() or not url.isprintable() or " " in url:
         raise AddressRefused(
-            f"A webhook's URL has at most {LONGEST_URL} printable ASCII characters."
+            f"A webhook's URL may have at most {LONGEST_URL} printable ASCII characters."
         )
     if parts.scheme not in ("https", "http") or not host:
-        raise AddressRefused(f"{url!r} is no URL such as https://ops.example/slewline.")
+        raise AddressRefused(f"{url!r} is not a URL such as https://ops.example/slewline.")
     if parts.username is not None or parts.fragment:
-        raise AddressRefused("A webhook's URL has no user, password or fragment.")
+        raise AddressRefused("A webhook's URL may not have a user, password or fragment.")
     if private:
         return
     if parts.scheme != "https":
-        raise AddressRefused("Webhooks go to https:// only.")
+        raise AddressRefused("Webhooks may only go to https:// addresses.")
     if host in _THIS_MACHINE:
         raise AddressRefused(_refusal(host, host))
     try:

@@ -109,7 +109,7 @@ def _add(
     delivery_id = new_id()
     outcome: dict[str, Any] = {"state": "pending", "due_at": utc_now()}
     if num_pending(session, webhook.id) >= MOST_PENDING:
-        why = f"{MOST_PENDING} messages waited for this webhook already."
+        why = f"{MOST_PENDING} messages were already waiting for this webhook."
         outcome = {"state": "failed", "last_error": why, "ended_at": utc_now()}
     session.execute(
         sa.insert(WebhookDeliveryRow).values(

@@ -52,12 +52,13 @@ def parse_instant(value: object) -> datetime:
     match = _RFC3339.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         raise PydanticCustomError(
-            "invalid_time", "An instant is RFC 3339, for example 2026-01-31T12:00:00.000Z"
+            "invalid_time",
+            "An instant must be in RFC 3339 form, for example 2026-01-31T12:00:00.000Z",
         )
     day, clock, fraction, offset = match.groups()
     if offset is None:
         raise PydanticCustomError(
-            "naive_time", "The instant has no time zone: end it in Z or in an offset from UTC"
+            "naive_time", "The instant has no time zone: end it with Z or an offset from UTC"
         )
     zone = "+00:00" if offset in "Zz" else offset
     try:
@@ -125,7 +126,9 @@ def require_plain(value: T) -> T:
         elif isinstance(part, list):
             waiting += part
         elif isinstance(part, str) and not is_plain(part):
-            raise PydanticCustomError("plain_text", "A text holds characters that none may hold")
+            raise PydanticCustomError(
+                "plain_text", "A text contains characters that are not allowed"
+            )
         elif isinstance(part, int | float) and not abs(part) <= _LARGEST:
             raise PydanticCustomError("finite_number", "A number is infinite or beyond 1.8e308")
     return value
@@ -220,7 +223,7 @@ class Body(Wire):
         if isinstance(value, dict) and len(value) > _MOST_FIELDS:
             raise PydanticCustomError(
                 "too_many_fields",
-                "The object has {num_fields} fields; {most} are the most",
+                "The object has {num_fields} fields; the limit is {most}",
                 {"num_fields": len(value), "most": _MOST_FIELDS},
             )
         return value

@@ -100,7 +100,7 @@ class ChangeIn(Body):
     def _changes_something(self) -> ChangeIn:
         if not (self.force or self.forbid) and self.relax.is_empty:
             raise PydanticCustomError(
-                "nothing_changed", "Give force, forbid or relax: nothing is to be different"
+                "nothing_changed", "Give force, forbid or relax: the request changes nothing"
             )
         return self
 

@@ -52,7 +52,7 @@ class PinnedActionIn(Body):
         if not isinstance(value, dict) or "mode" not in value:
             return value
         if value["mode"] not in get_args(PinnedMode):
-            raise PydanticCustomError("no_pinned_mode", "Only collects and contacts are pinned")
+            raise PydanticCustomError("no_pinned_mode", "Only collects and contacts can be pinned")
         # Ids of opportunities differ between scenarios; times and sites suffice.
         own = cls.model_fields.keys() - {"opportunity_id"}
         dropped = OF_ACTIONS - own

@@ -96,7 +96,7 @@ def test_a_horizon_outside_the_span_is_refused_by_name(client: httpx.Client) -> 
     flown = post(client, "/v1/satellites", {"name": "FD", "oem": message(), "spacecraft": "paper"})
     refused = client.post("/v1/scenarios", json=scenario(client, flown["id"], BEYOND))
     problem = assert_problem(refused, 422, "orbit_outside_span", "/satellite_ids/0")
-    assert "'PAPER' is usable 2018-12-31T23:50:00Z" in problem["detail"]
+    assert "'PAPER' is usable from 2018-12-31T23:50:00Z" in problem["detail"]
 
 
 def test_bad_lines_are_named(client: httpx.Client) -> None:

@@ -200,8 +200,8 @@ def test_swapped_latitude_and_longitude_are_told(service: Service) -> None:
 @pytest.mark.parametrize(
     ("text", "advice"),
     [
-        ("id,lat,lon\na,48,5,-3,25\n", "put semicolons between cells"),
-        ('id,lat,lon\na,"48,5","-3,25"\n', "Write it with a point"),
+        ("id,lat,lon\na,48,5,-3,25\n", "separate cells with semicolons"),
+        ('id,lat,lon\na,"48,5","-3,25"\n', "Write it with a decimal point"),
     ],
 )
 def test_decimal_commas_between_commas_are_refused_with_what_to_do(

@@ -214,7 +214,7 @@ def test_a_bad_question_is_named_by_its_pointer(
 @pytest.mark.parametrize(
     ("limits", "words"),
     [
-        ({"max_targets": 107}, "The scenario has 108 targets; 107 are the most."),
+        ({"max_targets": 107}, "The scenario has 108 targets; the limit is 107."),
         (
             {"max_satellite_target_days": 26.9},
             "1 satellites times 108 targets times 0.25 days are 27; the limit is 26.9.",

@@ -100,7 +100,7 @@ def test_pages_of_other_sites_may_call_only_where_they_are_listed(make_door: Mak
 
 @pytest.mark.parametrize("origins", ["*", "ops.example", "https://ops.example/", "null"])
 def test_only_whole_origins_can_be_listed(origins: str) -> None:
-    with pytest.raises(ValueError, match="is no origin"):
+    with pytest.raises(ValueError, match="is not an origin"):
         Settings(cors_origins=origins)
 
 

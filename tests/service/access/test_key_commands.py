@@ -58,7 +58,7 @@ def test_a_key_is_printed_once_alone_and_listed_without_its_secret(program: Prog
 def test_a_key_is_revoked_by_its_id(program: Program) -> None:
     key_id = program.create().split("_")[1]
     assert program.run("keys", "revoke", key_id) == (OK, f"Key {key_id} is revoked.\n", "")
-    assert "before" in program.run("keys", "revoke", key_id)[1]
+    assert "already" in program.run("keys", "revoke", key_id)[1]
     assert program.run("keys", "list")[1].split()[-1] == "revoked"
     status, _, said = program.run("keys", "revoke", "000000000000")
     assert status == WRONG_INPUT

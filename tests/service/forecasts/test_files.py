@@ -44,7 +44,7 @@ def test_a_grid_may_stand_in_any_order() -> None:
     assert field.lat_deg.tolist() == [38.0, 39.0, 40.0]
     assert field.lon_deg.tolist() == [170.0, 175.0, 180.0, 185.0]
     assert field.value.tolist() == np.rint(VALUES[:, ::-1] * WHOLE).tolist()
-    assert notes == ["Probabilities are kept to 1/10,000."]
+    assert notes == ["Probabilities are rounded to 1/10,000."]
     other = text(
         *(",".join(reversed(line.split(","))) for line in reversed(lines())),
         header="clear_probability,lng,LAT,time",
@@ -85,14 +85,14 @@ def test_a_globe_that_ends_where_it_begins_has_one_column_less() -> None:
         (text(), "empty_file", None, "no records"),
         (b"\xff\xff", "not_utf8", None, "UTF-8"),
         (text("x", header="time,lat_deg,lon_deg"), "missing_field", 1, "clear_probability"),
-        (text(header="time,lat_deg,lon_deg,clear_probabilty"), "unknown_field", 1, "is meant"),
+        (text(header="time,lat_deg,lon_deg,clear_probabilty"), "unknown_field", 1, "did you mean"),
         (text("2026-03-01T00:00:00,1,2,0.5"), "invalid_value", 2, "time"),
         (text("yesterday,1,2,0.5"), "invalid_value", 2, "time"),
         (text(f"{TIMES[0]},91,2,0.5"), "invalid_value", 2, "lat_deg"),
         (text(f"{TIMES[0]},1,361,0.5"), "invalid_value", 2, "lon_deg"),
         (text(f"{TIMES[0]},1,2,1.5"), "invalid_value", 2, "clear_probability"),
         (text(f"{TIMES[0]},1,2,nan"), "invalid_value", 2, "clear_probability"),
-        (text(f"{TIMES[0]},1,2,"), "invalid_value", 2, "no number"),
+        (text(f"{TIMES[0]},1,2,"), "invalid_value", 2, "not a number"),
         (text(f"{TIMES[0]},1,2"), "malformed_csv", 2, "clear_probability is missing"),
         (text(*lines(), lines()[3]), "invalid_value", 26, "twice"),
         (text(*lines()[1:]), "invalid_value", None, "not full"),
@@ -283,5 +283,5 @@ def test_a_small_file_of_a_huge_grid_is_refused_before_it_is_read() -> None:
             "tcc", tuple(shape), dtype="f4", chunks=(1, 500, 500), compression="gzip"
         )
     assert len(buffer.getvalue()) < 100_000
-    with pytest.raises(ServiceError, match="20000000 are the most"):
+    with pytest.raises(ServiceError, match="the limit is 20000000"):
         read_netcdf(buffer.getvalue())

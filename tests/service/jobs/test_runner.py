@@ -175,7 +175,9 @@ def test_a_process_over_its_memory_limit_is_killed(runner: Runner, log: Path) ->
 
 def test_a_process_that_crashes_is_told_by_its_signal(runner: Runner, log: Path) -> None:
     ending = run(runner, log, "crash")
-    assert ending == Refused("solver_crashed", "The solver's process ended by itself (signal 11).")
+    assert ending == Refused(
+        "solver_crashed", "The solver's process ended unexpectedly (signal 11)."
+    )
 
 
 def test_wrong_data_is_refused_with_its_own_code(runner: Runner, log: Path) -> None:
