@@ -19,34 +19,34 @@ LABELS: Final = tuple(f" {label}" for label in FACTORS)
 """Endings of the names of changed constants."""
 
 _CONSTANTS: Final = """\
-One draw of each family, and half and double of each constant that acts there. A change of one image
-is 0.1 to 0.4 points, and on a busy machine times scatter by a third: what counts is a constant that
-is worse on both sides, or by several images. A constant that no line marks has a wide range in
-which its value is as good as another.
+One draw of each family, with half and double of each constant that acts there. One image is 0.1 to
+0.4 points, and on a busy machine times vary by a third: a "yes" counts only if both other values
+are worse, or one of them by several images. If no line marks a constant, any value in a wide range
+is as good as its own.
 
-Left out: `aimed` and `tie`, which kernels freeze when they are compiled; and two families in which
-the last big step of the search falls near the end of the time (`weights-1000`,
-`fleet-stations-4x2000`): run beside other work, they said more of that work than of the constants.
+Left out are `aimed` and `tie`, which are compiled into kernels, and two families in which the last
+big step of the search comes near the end of the time (`weights-1000`, `fleet-stations-4x2000`): run
+beside other work, their results depended more on that work than on the constants.
 """
 
 _HEAD: Final = """\
 # What the engine's parts are worth
 
 `python -m benchmarks.ablation` plans cases of the suite with one thing changed: a strategy left
-out, or a constant halved or doubled (of a share above one half, the rest to 1). Its rows are in
-[ablation.csv](ablation.csv); this page is made of them. Draws, seeds and CPU seconds are those of
-the solver as it is, beside which each change stands.
+out, or a constant halved or doubled (for a share above one half, its distance from 1). Its rows are
+in [ablation.csv](ablation.csv), from which this page is generated. Each change is compared with the
+unchanged solver on the same draws, with the same seeds and CPU seconds.
 
-A strategy earns its place where, without it, the gap grows by more than 0.2 percentage points on
-some family, or the time to some gap by more than 10 %. One image is 0.1 to 0.3 points, and the
-last image a matter of luck: the time to 0 % differs by a factor of two from seed to seed, so a
-verdict on that column alone takes more than two draws. What was not missed is gone from the
-engine since; its rows stay, with the revision that still had it. `exhaust` shows on smaller
-missions only: of 240 drawn as the tests draw them all were closed with it, 222 without.
-`preference` shows in the time on the 24 satellites of `benchmarks/fleet`: within 1.5 % after 28, 36
-and 41 CPU seconds without it, after 35, 20 and 27 with it (seeds 0 to 2). `windows of the first
-plan` shows where time ends before there is a bound: `half-life-12h-share-paper-1000` earns 276.5
-after 0.4 CPU seconds with it, and 233.5 without.
+A strategy earns its place if, without it, the gap grows by more than 0.2 percentage points on some
+family, or the time to some gap by more than 10 %. One image is 0.1 to 0.3 points, and when the last
+image is found is a matter of luck: the time to 0 % varies by a factor of two between seeds, so that
+column decides nothing with two draws alone. Strategies that were not missed have since been removed
+from the engine, unless they are missed elsewhere; their rows stay, with the revision that still had
+them. `exhaust` matters only on smaller missions: of 240 drawn as in the tests, all were closed with
+it and 222 without. `preference` saves time on the 24 satellites of `benchmarks/fleet`: they are
+within 1.5 % after 28, 36 and 41 CPU seconds without it, after 35, 20 and 27 with it (seeds 0 to 2).
+`windows of the first plan` matters if the time ends before there is a bound:
+`half-life-12h-share-paper-1000` earns 276.5 after 0.4 CPU seconds with it, and 233.5 without.
 """
 
 

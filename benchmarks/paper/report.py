@@ -50,9 +50,9 @@ def _opening(study: Study, done: Done, took_min: float, command: str) -> str:
     unfinished = [part for part in parts(study, done) if not part.is_whole]
     if unfinished:
         told = "; ".join(f"{p.name}: {p.planned - p.runs} of {p.planned} runs" for p in unfinished)
-        state = f"**Left out for lack of time**: {told}. The same command goes on from there."
+        state = f"**Left out for lack of time**: {told}. The same command continues from there."
     else:
-        state = "Every run of the plan was made."
+        state = "All planned runs were made."
     return f"""# The paper's study, run again
 
 Eddy and Kochenderfer, *Markov Decision Processes For Multi-Objective Satellite Task Planning*.
@@ -61,9 +61,9 @@ Written by `{command}` on {datetime.now(UTC).date().isoformat()}; do not edit by
 Machine: {machine.description()}.
 All runs together took {took_min:.0f} minutes, one solver at a time on each core. {state}
 
-The referee scores every plan: an image earns 1 once per target, and nothing when its action
-breaks a rule. "Images" counts distinct targets imaged whatever is broken, which is what the
-paper seems to report."""
+The referee scores every plan: each target earns 1 once, and an image whose action breaks a rule
+earns nothing. "Images" counts distinct targets imaged, whether or not rules are
+broken, as the paper seems to do."""
 
 
 def _claims(study: Study, done: Done) -> str:
@@ -78,12 +78,12 @@ def _claims(study: Study, done: Done) -> str:
     ]
     return (
         "## What reproduces and what does not\n\n"
-        f"Under the reading of all figures and grids ({BASE.name}), and under the nearest reading: "
-        "for a number the one nearest to it, for an order of methods the one nearest to all four "
-        "numbers. A number reproduces within 3 %.\n\nThe nearest reading is picked after the "
-        "fact, among many and on one draw: it shows what could explain the paper's number, not "
-        "that it does.\n\n"
-        + _table(["the paper", "here", "nearest reading", "measured (images, or as said)"], rows)
+        f"Each claim is checked under the reading of all figures and grids ({BASE.name}), and "
+        "under the nearest reading: for a number the one nearest to it, for a ranking of methods "
+        "the one nearest to all four numbers. A number reproduces if it is within 3 %.\n\n"
+        "The nearest reading is picked after the fact, among many and on one draw: it shows what "
+        "could explain the paper's number, not that it does.\n\n"
+        + _table(["the paper", "here", "nearest reading", "measured (images unless stated)"], rows)
     )
 
 
@@ -148,15 +148,15 @@ def _grids(study: Study, done: Done, folder: Path) -> str:
         rows = [_outcome_row(row) for row in outcome_rows(study, done, solver)]
         parts += [
             f"### {title}",
-            f"Measured points of {len(grid)}: {counts}. Rewards are means over a point's runs; "
-            "images in brackets where rules are broken.",
+            f"Points measured, of {len(grid)}: {counts}. Rewards are means over a point's runs; "
+            "images in brackets if rules are broken.",
             _table(
                 ["resources", "N_a", "paper: setting", "reward", "here, same setting",
                  "our best setting", "reward"],
                 rows,
             ),
         ]  # fmt: skip
-    parts.append("The headings of the paper's Table 7 are swapped; they are put right here.")
+    parts.append("The headings of the paper's Table 7 are swapped; they are corrected here.")
     return "\n\n".join(parts)
 
 
@@ -189,10 +189,10 @@ def _reward(point: Point | None) -> str:
 
 def _readings(study: Study, done: Done) -> str:
     parts = [
-        "## Readings that bring ours nearest",
-        "The paper's text leaves these open, or says otherwise than the authors' code. One draw "
+        "## Readings that come nearest to the paper",
+        "The paper's text leaves these open, or differs in them from the authors' code. One draw "
         f"of {study.grid_targets} targets, the paper's best row of each table; distinct images, "
-        "and in brackets the referee's reward where rules are broken.",
+        "and in brackets the referee's reward if rules are broken.",
     ]
     parts.append(
         _table(
@@ -247,18 +247,18 @@ def _method(study: Study) -> str:
 - Targets: {limits} drawn without replacement from the shipped WRS-2 land scenes, draw k with
   seed k. The paper's own samples are not published.
 - Figures and grids use the reading "{BASE.name}": off-nadir angles in degrees; telemetry and
-  downlink rates of the text; a task books its resources at once.
-- Seconds are CPU seconds of the solving process (`time.process_time`), so that other load hardly
-  counts; the solver's alone: compiled, with the problem built, median of three where quick.
+  downlink rates as in the text; a task's resources are booked at once.
+- Seconds are CPU seconds of the solver alone (`time.process_time`), so that other load hardly
+  matters: kernels are compiled and the problem is built before. Of quick runs, the median of three.
 - Exact solvers stop after {study.exact_limit_s:.0f} CPU seconds. The bound is the best that any
-  run on the same problem proves, or the quick bound of every timeline. "Bound reached"
-  counts draws where a valid plan attains it.
-- MILP starts from the plans of the rule, graph and forward search, in the pairwise form too.
+  run on the same problem proves, including the quick bound of every timeline. "Bound reached"
+  counts the draws in which a valid plan attains it.
+- MILP starts from the plans of the rule, graph search and forward search, in the pairwise form too.
 - The grids are tuned on draw 0 with the paper's settings (soft limits, Table 2); gamma in
   {", ".join(f"{g:g}" for g in gammas)}. Of the MCTS points, those that lead
   for their N_a after one run get all their runs first; the best is chosen
   among points with equally many runs.
-- Numbers behind each plot and grid lie beside the plots as CSV."""
+- The numbers of each plot and grid are CSV files beside the plots."""
 
 
 def _cost(study: Study, done: Done) -> str:
@@ -267,11 +267,11 @@ def _cost(study: Study, done: Done) -> str:
         [part.name, f"{part.runs} of {part.planned}", f"{part.cost_s / 60.0:.2f}"] for part in made
     ]
     rows.append([
-        "together",
+        "total",
         f"{sum(part.runs for part in made)} of {sum(part.planned for part in made)}",
         f"{sum(part.cost_s for part in made) / 60.0:.2f}",
     ])  # fmt: skip
     return (
-        "## What it cost\n\nCPU time of all processes, with building the problems, repeats for "
-        "timing and the bounds.\n\n" + _table(["part", "runs", "CPU minutes"], rows)
+        "## What it cost\n\nCPU time of all processes, including building the problems, repeats "
+        "for timing and the bounds.\n\n" + _table(["part", "runs", "CPU minutes"], rows)
     )

@@ -204,7 +204,7 @@ def test_the_page_shows_every_figure_and_table(page: Path) -> None:
         f"{family}-resources-{size}.png" for family in ("with", "without") for size in (20, 30)
     ]
     assert all(f"paper/{name}" in text for name in pictures)
-    for part in ("Table 6", "Table 7", "does not reproduce", "Every run of the plan was made"):
+    for part in ("Table 6", "Table 7", "does not reproduce", "All planned runs were made"):
         assert part in text
 
 
