@@ -80,5 +80,5 @@ def test_so_many_messages_wait_for_a_webhook_and_no_more(
     queue_tests(post, webhook_id, 5)
     rows = post.rows()
     assert [row.state for row in rows] == ["pending"] * 3 + ["failed"] * 2
-    assert "waited" in str(rows[-1].last_error)
+    assert "waiting" in str(rows[-1].last_error)
     assert rows[-1].ended_at is not None
