@@ -173,7 +173,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "windows by small programs": _FEW_OF_AGE,
             "windows of the first plan": {"half-life-12h-1000": 12.0},
             "a fleet's plans without the half-life": _OF_AGE_SHARED,
-            "days planned anew": _OF_AGE_SHARED,
+            "days planned anew": _OF_AGE_SHARED | {"half-life-12h-fleet-4x2000": 40.0},
             "multipliers of contacts": _OF_AGE,
             "queues": _OF_AGE,
             "plans by their contacts": _OF_AGE,
