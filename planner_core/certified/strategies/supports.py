@@ -37,12 +37,12 @@ def has_continuous_starts(problem: Problem) -> bool:
 
 
 def has_continuous_starts_alone(problem: Problem) -> bool:
-    """Whether starts are free, and neither battery nor recorder counts."""
+    """Whether starts are continuous, and neither battery nor recorder counts."""
     return has_continuous_starts(problem) and not problem.use_resources
 
 
 def has_continuous_starts_with_resources(problem: Problem) -> bool:
-    """Whether starts are free, and battery and recorder count."""
+    """Whether starts are continuous, and battery and recorder count."""
     return has_continuous_starts(problem) and problem.use_resources
 
 
