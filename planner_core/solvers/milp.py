@@ -84,5 +84,6 @@ class Milp:
             formulation=self.formulation,
             cut_rounds=self.cut_rounds,
             moves_per_task=self.moves_per_task,
+            begins_smaller=True,
         )
         return program.solve(problem, budget, seed, self.gap)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from benchmarks.missions import paper_scenario, problem_of
 from planner_core.budget import Budget, Termination
 from planner_core.certified.dp import resource_network
 from planner_core.certified.driver import Search
@@ -19,9 +20,11 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.mip.highs import Outcome
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.solver import Certified
 from planner_core.certified.strategies.every import STRATEGIES
+from planner_core.certified.strategies.whole_program import WholeProgram
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Agility, Objective
 from planner_core.problem import COLLECT, Problem
@@ -123,9 +126,34 @@ def test_highs_knows_what_stays_on_board(
     )
     problem = with_objective(problem, Objective(collected_share=collected_share))
     best = best_reward(problem)
-    solution = Milp().solve(problem, Budget(), 0)
+    # Half of them as if they were large: the smaller program comes first.
+    with tuned(open_tasks=0 if seed % 2 else 1000):
+        solution = Milp().solve(problem, Budget(), 0)
     assert replay(problem, solution.plan).reward == pytest.approx(best)
     assert solution.bound == pytest.approx(best, abs=1e-4)
+
+
+def test_a_smaller_program_finds_a_plan_for_many_tasks_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = problem_of(paper_scenario(60, 1, use_resources=True))
+    problem = with_objective(problem, Objective(collected_share=0.9))
+    rewards: list[float] = []
+    searched = WholeProgram._search
+
+    def search(self: WholeProgram, *args: Any) -> Outcome:
+        rewards.append(args[3].reward)
+        return searched(self, *args)
+
+    monkeypatch.setattr(WholeProgram, "_search", search)
+    solution = Milp().solve(problem, Budget(), 0)
+    (start,) = rewards
+    rewards.clear()
+    with tuned(open_tasks=0):
+        again = Milp().solve(problem, Budget(), 0)
+    before, after, *_ = rewards
+    assert start == before < after
+    assert after <= replay(problem, again.plan).reward == replay(problem, solution.plan).reward
 
 
 def test_highs_rounds_no_bound_to_whole_sums() -> None:

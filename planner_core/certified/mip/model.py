@@ -141,7 +141,7 @@ def plan_program(
         else None
         for satellite in problem.satellites
     ]
-    lost = _binding_losses(problem)
+    lost = binding_losses(problem)
     if on_board != "worth less":
         lost[:] = 0.0
     if on_board == "priced":
@@ -196,7 +196,7 @@ def _variables(
     return taken, down, _paid_for_the_best(program, problem, taken, down, lost)
 
 
-def _binding_losses(problem: Problem) -> Floats:
+def binding_losses(problem: Problem) -> Floats:
     """Return how much less each image is worth if it stays on board. Shape ``(n,)``.
 
     0 for satellites whose plans hold only images that come down, and for images that cannot.

@@ -18,7 +18,13 @@ from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.lns.search import improved
 from planner_core.certified.mip.clique_cuts import violated_cliques
 from planner_core.certified.mip.highs import Engine, Outcome, Watch
-from planner_core.certified.mip.model import Formulation, PlanProgram, plan_program
+from planner_core.certified.mip.model import (
+    Formulation,
+    OnBoard,
+    PlanProgram,
+    binding_losses,
+    plan_program,
+)
 from planner_core.certified.mip.program import Rows
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.sizes import MAX_PAIRS, PAUSE_S
@@ -42,11 +48,16 @@ class WholeProgram:
     ----------
     formulation, cut_rounds, moves_per_task
         As ``planner_core.solvers.milp`` says.
+    begins_smaller
+        Whether, if images lose worth on board and tasks are many, a program that charges for all
+        data left on board finds a plan first. It has no columns for images that come down: the
+        demonstration's mission has its best plan after 2 s, and after 20 s without.
     """
 
     formulation: Formulation = "antichain"
     cut_rounds: int = 200
     moves_per_task: float = 30.0
+    begins_smaller: bool = False
 
     def solve(self, problem: Problem, budget: Budget, seed: int, gap: float) -> Solution:
         """Return the best plan; the same one for the same seed if the budget suffices."""
@@ -68,6 +79,11 @@ class WholeProgram:
                 )
             )
             return best.solution()
+        is_large = len(problem.opportunities) > TUNING.open_tasks
+        if self.begins_smaller and is_large and binding_losses(problem).any():
+            part = budget.part(2.0 * TUNING.beginning)
+            smaller = self._search(problem, part, seed, best, INSIDE, "priced")
+            best.offer(_repaired(problem, _plan_of(problem, smaller)))
         # The limits are strict, which no linear program can express. The first search lets plans
         # touch them, so that its bound holds; if its plan is not valid, a second one stays inside.
         outcome = self._search(problem, budget, seed, best, TOUCHING)
@@ -84,9 +100,15 @@ class WholeProgram:
         return best.solution()
 
     def _search(
-        self, problem: Problem, budget: Budget, seed: int, best: Incumbent, margin: float
+        self,
+        problem: Problem,
+        budget: Budget,
+        seed: int,
+        best: Incumbent,
+        margin: float,
+        on_board: OnBoard = "worth less",
     ) -> Outcome:
-        model = plan_program(problem, self.formulation, margin)
+        model = plan_program(problem, self.formulation, margin, on_board=on_board)
         if problem.use_resources:
             model.program.tell_apart()
         engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
