@@ -96,6 +96,7 @@ def fields_read_by(module: ModuleType) -> set[str]:
 
     A value read once, for its kernels, is kept under a name in capitals.
     """
+    # A module of a file has a loader that knows its source.
     source: str = module.__loader__.get_source(module.__name__)  # type: ignore[union-attr]
     running = "\n".join(line for line in source.splitlines() if line[:1].isspace())
     return {each.name for each in fields(Tuning) if f"TUNING.{each.name}" in running}

@@ -30,8 +30,8 @@ class Tuning:
     rounds
         Steps of a search that is to do more than a moment's work; levels of noise.
     fleet_patience
-        Turns of a fleet's searches without a better plan before the solver ends; windows with free
-        starts under resources.
+        Turns of a fleet's searches without a better plan before the solver ends; windows with
+        continuous starts under resources.
 
     first_step_of_paths, first_step
         How far multipliers move in the first epoch, as a share of targets' worth: in an ascent on

@@ -30,7 +30,7 @@ def start_at_multipliers(
         Targets that are taken already. Shape of ``multipliers``.
     """
     rng = np.random.default_rng(seed)
-    priced = np.maximum(worth - multipliers[network.site], TUNING.trifle * worth)
+    reduced = np.maximum(worth - multipliers[network.site], TUNING.trifle * worth)
     weight, value = np.empty(len(network.row)), np.empty(len(network.row))
     previous = np.empty(len(network.row), dtype=np.int32)
     best, best_reward = [], -1.0
@@ -38,7 +38,7 @@ def start_at_multipliers(
         is_left = ~taken
         nodes = np.concatenate(
             [
-                _take(network, part, priced, worth, is_left, weight, value, previous)
+                _take(network, part, reduced, worth, is_left, weight, value, previous)
                 for part in rng.permutation(len(network.first) - 1)
             ]
         )
@@ -50,12 +50,12 @@ def start_at_multipliers(
 
 @kernel
 def _take(
-    network: Network, part: int, priced: Floats, worth: Floats, is_left: Bools,
+    network: Network, part: int, reduced: Floats, worth: Floats, is_left: Bools,
     weight: Floats, value: Floats, previous: Ints,
 ) -> Ints:  # fmt: skip
     """Return the best node of each free target on the heaviest path, and mark these as taken."""
     for a in range(network.first[part], network.first[part + 1]):
-        weight[a] = priced[a] if is_left[network.site[a]] else 0.0
+        weight[a] = reduced[a] if is_left[network.site[a]] else 0.0
     _, at = heaviest_path(network, part, weight, value, previous)
     nodes = np.empty(network.first[part + 1] - network.first[part], dtype=np.int32)
     count = 0

@@ -194,12 +194,7 @@ def _cost_of(
 
 @borrowing_inner
 def _weigh(
-    search: SearchData,
-    plan: Assignment,
-    work: Workspace,
-    low: int,
-    high: int,
-    draws: Uint64s,
+    search: SearchData, plan: Assignment, work: Workspace, low: int, high: int, draws: Uint64s
 ) -> None:
     """Set the gain of each task of a window, and count how often each target occurs in it.
 
@@ -239,12 +234,7 @@ def _weigh(
 
 @borrowing_inner
 def _weigh_liking(
-    search: SearchData,
-    plan: Assignment,
-    work: Workspace,
-    low: int,
-    high: int,
-    draws: Uint64s,
+    search: SearchData, plan: Assignment, work: Workspace, low: int, high: int, draws: Uint64s
 ) -> None:
     """Do the same for a polish: worth first, then liking; contacts stay as they are.
 

@@ -150,7 +150,7 @@ class FixedContacts:
         kept = offered & (problem.opportunities.kind == COLLECT)
         kept[[*fixed, *others, *problem.kept_rows.tolist()]] = True
         self._rows = np.flatnonzero(kept).astype(np.int32)
-        self._model = plan_program(problem, "antichain", INSIDE, self._rows, on_board="priced")
+        self._model = plan_program(problem, "antichain", INSIDE, self._rows, on_board="at a cost")
         self._limit(self._is_fixed(fixed))
         self._budget, self._seed = budget, seed
         self._engine = self._new_engine()

@@ -34,7 +34,7 @@ from planner_core.problem.delivery import lost_on_board
 from planner_core.problem.restrict import restricted
 
 Formulation = Literal["antichain", "pairwise"]
-OnBoard = Literal["worth less", "priced", "worth the same"]
+OnBoard = Literal["worth less", "at a cost", "worth the same"]
 """How images that stay on board count: each image has a column for coming down, and more for when
 if it ages; or all data left on board at the end has one cost per unit; or they lose nothing."""
 
@@ -136,7 +136,7 @@ def plan_program(
         How images that stay on board count.
     """
     terms = [
-        resource_terms(problem, satellite, costs_left=on_board == "priced")
+        resource_terms(problem, satellite, costs_left=on_board == "at a cost")
         if problem.use_resources and len(satellite)
         else None
         for satellite in problem.satellites
@@ -144,7 +144,7 @@ def plan_program(
     lost = binding_losses(problem)
     if on_board != "worth less":
         lost[:] = 0.0
-    if on_board == "priced":
+    if on_board == "at a cost":
         problem = replace(problem, worth=worth_before_left(problem))
     if rows is not None:
         # What a task costs depends on all tasks around it, taken or not, hence terms come first.

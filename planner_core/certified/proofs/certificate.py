@@ -179,7 +179,7 @@ def values_through(
         Which of the rows a plan may be paid for; all by default. Shape ``(len(rows),)``.
     """
     meant = rows if is_open is None else rows[is_open]
-    constant, paid = _priced(problem, meant, step)
+    constant, paid = _at_multipliers(problem, meant, step)
     worth = np.zeros(len(rows))
     worth[slice(None) if is_open is None else is_open] = paid
     total, through = heaviest_through(network, worth[network.row])
@@ -191,7 +191,7 @@ def is_below(value: Floats | float, amount: float) -> Bools:
     return np.asarray(value) < amount - ROUNDING * max(1.0, abs(amount))
 
 
-def _priced(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Floats]:
+def _at_multipliers(problem: Problem, rows: Ints, step: Multipliers) -> tuple[float, Floats]:
     """Return the constant of the bound, and what each opportunity is worth at the multipliers."""
     table = problem.opportunities
     is_collect = table.kind == COLLECT

@@ -322,15 +322,15 @@ class _Needs(NamedTuple):
         cls, network: Network, levels: DataLevels, weight: Ints, multiplier: float, near: int | None
     ) -> _Needs:
         change = np.maximum(levels.gain, levels.floor - levels.before)
-        priced = np.ceil(weight - multiplier * change - ROUNDING)
-        priced = np.maximum(priced, 0.0).astype(np.int32)
+        reduced = np.ceil(weight - multiplier * change - ROUNDING)
+        reduced = np.maximum(reduced, 0.0).astype(np.int32)
         free = np.maximum(levels.end - np.arange(levels.num_levels), 0)
         credit = np.ceil(multiplier * free - ROUNDING).astype(np.int32)
         at_start = int(credit[min(levels.start, levels.num_levels - 1)])
         limit = int(1.07 * near) if near is not None else 0
-        limit += 128 + int(priced.max(initial=0))
+        limit += 128 + int(reduced.max(initial=0))
         while True:
-            idle, after = least_energy(network, priced, limit)
+            idle, after = least_energy(network, reduced, limit)
             most = int(np.flatnonzero(idle[0] <= network.energy_start)[-1])
             if most < limit:
                 break
