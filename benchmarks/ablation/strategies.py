@@ -133,6 +133,7 @@ _AGE_ON_BOARD: Final = {
 _FEW_OF_AGE: Final = {"half-life-3h-100": 8.0}
 _OF_AGE: Final = {**_FEW_OF_AGE, "half-life-12h-1000": 12.0}
 _FEW_OF_AGE_SHARED: Final = {"half-life-3h-fleet-4x80": 10.0}
+_SOON_OLD_SHARED: Final = {"half-life-1h-fleet-4x1000": 10.0}
 _OF_AGE_SHARED: Final = {"half-life-6h-network-4x400": 20.0}
 _OWN_CONTACTS: Final = {"weights-1000": 20.0, "clouds-1000": 15.0, "share-paper-500": 15.0}
 _SHARED: Final = {"share-fleet-paper-4x500": 12.0, "quality-sun-network-4x300": 15.0}
@@ -171,7 +172,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "plans without the half-life": _AGE_ON_BOARD,
             "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
             "windows by small programs": _FEW_OF_AGE,
-            "windows of the first plan": {"half-life-12h-1000": 12.0},
+            "forward search": _SOON_OLD_SHARED,
+            "windows of the first plan": {"half-life-12h-1000": 12.0} | _SOON_OLD_SHARED,
             "a fleet's plans without the half-life": _OF_AGE_SHARED,
             "days planned anew": _OF_AGE_SHARED | {"half-life-12h-fleet-4x2000": 40.0},
             "multipliers of contacts": _OF_AGE,

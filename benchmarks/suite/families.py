@@ -235,6 +235,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=4, num_targets=80, budget_s=10.0, quick_budget_s=None, num_draws=3,
         dynamics="physical", objective=_halved_in(3.0),
     ),
+    "half-life-1h-fleet-4x1000": Family(
+        num_satellites=4, num_targets=1000, budget_s=15.0, quick_budget_s=None, spacing_s=30.0,
+        dynamics="physical", objective=_halved_in(1.0),
+    ),
     "half-life-6h-network-4x400": Family(
         num_satellites=4, num_targets=400, budget_s=20.0, quick_budget_s=None,
         dynamics="physical", objective=_halved_in(6.0, 0.5), num_stations=30,

@@ -202,8 +202,13 @@ STRATEGIES: Final = (
         slices=whole_program.images_by_contact,
     ),
     Strategy(
+        name="forward search",
+        supports=is_aging,
+        slices=first_plan.forward_search,
+    ),
+    Strategy(
         name="windows of the first plan",
-        supports=lambda p: is_aging_alone(p) and is_large(p),
+        supports=lambda p: is_aging(p) and is_large(p),
         slices=half_life.windows_of_the_first,
     ),
     Strategy(

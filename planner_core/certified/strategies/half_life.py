@@ -26,6 +26,7 @@ from planner_core.certified.strategies.first_plan import rule
 from planner_core.certified.strategies.half_life_steps import (
     Contacts,
     bettered_by_windows,
+    bettered_with_its_contacts,
     contacts_of,
 )
 from planner_core.certified.strategies.resource_steps import ResourceSearch
@@ -124,10 +125,7 @@ def windows_of_the_first(search: Search) -> Iterator[None]:
     1,000 targets, `paper`, a share of 0.9 earn 276.5 after 0.4 s; the rule's plan earns 233.5.
     """
     best = search.best
-    contacts = list(contacts_of(best.problem, best.plan))
-    part = with_contacts(best.problem, contacts, best.plan, best.judge(best.plan))
-    better = bettered_by_windows(best, part, best.plan, search.seed)
-    search.engine(ResourceSearch).offer(better)
+    search.engine(ResourceSearch).offer(bettered_with_its_contacts(best, best.plan, search.seed))
     best.report("plans")
     yield
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.resource_search import ResourceWindows
+from planner_core.certified.lns.settled_contacts import with_contacts
 from planner_core.certified.multipliers.latency import LatencyAscent
 from planner_core.certified.multipliers.queues import multipliers_by_queues
 from planner_core.certified.proofs.bound import Bound, rounded_bound
@@ -116,6 +117,14 @@ def bettered_by_windows(best: Incumbent, part: Problem, plan: Plan, seed: int) -
     windows.adopt(plan)
     windows.make_moves_on_each(TUNING.patience * TUNING.moves_in_a_step, best.budget)
     return windows.plan
+
+
+def bettered_with_its_contacts(best: Incumbent, plan: Plan, seed: int) -> Plan:
+    """Return a plan improved by replanning windows of it, its contacts taken."""
+    part = with_contacts(
+        best.problem, list(contacts_of(best.problem, plan)), plan, best.judge(plan)
+    )
+    return bettered_by_windows(best, part, plan, seed)
 
 
 def contacts_of(problem: Problem, plan: Plan) -> tuple[int, ...]:
