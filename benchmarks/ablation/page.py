@@ -45,8 +45,7 @@ from the engine, unless they are missed elsewhere; their rows stay, with the rev
 them. `exhaust` matters only on smaller missions: of 240 drawn as in the tests, all were closed with
 it and 222 without. `preference` saves time on the 24 satellites of `benchmarks/fleet`: they are
 within 1.5 % after 28, 36 and 41 CPU seconds without it, after 35, 20 and 27 with it (seeds 0 to 2).
-`windows of the first plan` matters if the time ends before there is a bound:
-`half-life-12h-share-paper-1000` earns 276.5 after 0.4 CPU seconds with it, and 233.5 without.
+`windows of the first plan` are now a part of `forward search`.
 """
 
 

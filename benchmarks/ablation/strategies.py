@@ -13,9 +13,11 @@ from typing import Any, Final
 
 from planner_core.budget import Budget
 from planner_core.certified.driver import ActiveStrategy
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.strategies import every
 from planner_core.certified.tuning import TUNING, tune
+from planner_core.problem.plan import Plan
 
 ENGINE: Final = "planner_core.certified"
 NOTHING: Final = ""
@@ -100,6 +102,11 @@ def _without_noise(search: ResourceWindows, num_moves: float, budget: Budget) ->
     search.make_moves_on_each(TUNING.rounds * num_moves, budget)
 
 
+def _unchanged(_best: Incumbent, plan: Plan, _seed: int) -> Plan:
+    """Leave a plan as it is."""
+    return plan
+
+
 def _off(module: str, name: str, value: Callable[..., Any]) -> tuple[Patch, ...]:
     return (Patch(module=f"{ENGINE}.{module}", name=name, value=value),)
 
@@ -173,7 +180,6 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "images by the contact that brings them down": _FEW_OF_AGE_SHARED,
             "windows by small programs": _FEW_OF_AGE,
             "forward search": _SOON_OLD_SHARED,
-            "windows of the first plan": {"half-life-12h-1000": 12.0} | _SOON_OLD_SHARED,
             "a fleet's plans without the half-life": _OF_AGE_SHARED,
             "days planned anew": _OF_AGE_SHARED | {"half-life-12h-fleet-4x2000": 40.0},
             "multipliers of contacts": _OF_AGE,
@@ -185,6 +191,10 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "exhaust": _RESOURCES | _SMALL,
         }.items()
     },
+    "windows of forward search's plan": Change(
+        patches=_off("strategies.half_life", "bettered_with_its_contacts", _unchanged),
+        families=_SOON_OLD_SHARED,
+    ),
     "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
     "relaxations of a fleet's contacts": Change(
         tuning={"most_relaxed": 0}, families=_STATIONS | {"share-fleet-4x2000": 40.0}

@@ -246,7 +246,7 @@ def test_where_images_earn_most_when_they_are_taken_a_half_life_leaves_some_on_b
     others = [one for one in STRATEGIES if one.name != name]
     assert len(others) == len(STRATEGIES) - 1
     with tuned(large=20, open_tasks=50):
-        for seed in (10, 12):
+        for seed in (0, 3, 15):
             problem = random_problem(
                 seed,
                 num_collects=60,

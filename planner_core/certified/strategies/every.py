@@ -35,7 +35,6 @@ from planner_core.certified.strategies.supports import (
     is_aging_in_programs,
     is_aging_on_board,
     is_alone_with_limits,
-    is_large,
     is_large_free_fleet,
     is_shared,
     is_shared_and_aging_in_programs,
@@ -204,12 +203,7 @@ STRATEGIES: Final = (
     Strategy(
         name="forward search",
         supports=is_aging,
-        slices=first_plan.forward_search,
-    ),
-    Strategy(
-        name="windows of the first plan",
-        supports=lambda p: is_aging(p) and is_large(p),
-        slices=half_life.windows_of_the_first,
+        slices=half_life.forward_search,
     ),
     Strategy(
         name="plans without the half-life",

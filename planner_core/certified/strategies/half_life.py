@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from planner_core.budget import Progress
+from planner_core.budget import Progress, ignored
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.alternating import AlternatingSearch
@@ -41,6 +41,7 @@ from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.delivery import without_half_life
 from planner_core.problem.plan import Plan
 from planner_core.problem.restrict import taking
+from planner_core.solvers.forward_search import ForwardSearch
 
 _FOR_PLANS: Final = (rule, windows_and_choices, choices_from_the_best)
 """Searches that find a good plan quickly, and lower no bound."""
@@ -119,13 +120,18 @@ def queues(search: Search) -> Iterator[None]:
     yield
 
 
-def windows_of_the_first(search: Search) -> Iterator[None]:
-    """Replan windows of the first plan with its own contacts, before bounds take long.
+def forward_search(search: Search) -> Iterator[None]:
+    """Plan by forward search, and replan windows with its contacts, before bounds take long.
 
-    1,000 targets, `paper`, a share of 0.9 earn 276.5 after 0.4 s; the rule's plan earns 233.5.
+    Forward search takes every contact that it can, so images come down early; the rule waits until
+    the recorder is nearly full. Four satellites over 1,000 targets, with a half-life of 1 h, earn
+    460 after 3 s this way, and 302 after 15 s by a plan in which images keep their worth.
     """
-    best = search.best
-    search.engine(ResourceSearch).offer(bettered_with_its_contacts(best, best.plan, search.seed))
+    best, engine = search.best, search.engine(ResourceSearch)
+    # What it reports on the way are not yet plans that the referee has judged.
+    quiet = search.budget.part(1.0, ignored)
+    engine.offer(ForwardSearch().solve(search.problem, quiet, search.seed).plan)
+    engine.offer(bettered_with_its_contacts(best, best.plan, search.seed))
     best.report("plans")
     yield
 

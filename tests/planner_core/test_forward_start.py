@@ -1,4 +1,4 @@
-"""The plans that searches start from."""
+"""The plan that searches start from if images age."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from planner_core.budget import Budget, Progress
 from planner_core.certified.driver import Search, Strategy
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.strategies import first_plan
+from planner_core.certified.strategies import half_life
 from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.domain import Objective
 from planner_core.problem import Problem
@@ -30,7 +30,7 @@ def _first(name: str) -> Strategy:
 
 
 @pytest.mark.parametrize("num_satellites", [1, 2, 4])
-def test_images_that_age_are_first_planned_with_the_contacts_of_forward_search(
+def test_images_that_age_are_first_planned_by_forward_search(
     num_satellites: int,
 ) -> None:
     """The rule alone earns less: it waits until the recorder is nearly full."""
@@ -54,6 +54,6 @@ def test_what_forward_search_expects_is_not_reported() -> None:
     problem = _aging(0, 2)
     told: list[Progress] = []
     best = Incumbent(problem, Budget(report=told.append), 0.0)
-    for _ in first_plan.forward_search(Search(best, 0, STRATEGIES)):
+    for _ in half_life.forward_search(Search(best, 0, STRATEGIES)):
         pass
     assert all(one.reward is None or one.reward <= best.reward for one in told)
