@@ -246,7 +246,8 @@ def test_the_proof_with_a_half_life_knows_contacts(continuous_starts: bool) -> N
         objective={"collected_share": 0.0, "half_life_s": 10_800},
         continuous_starts=continuous_starts,
     )
-    answer = run(scenario, "certified", gap=0.2)
+    # The bound that comes with the first plans, by agility, is within 0.2 of them already.
+    answer = run(scenario, "certified", gap=0.2 if continuous_starts else 0.05)
     assert answer.proof is not None
     document = ProofOut.model_validate_json(answer.proof)
     has_contacts = document.contact_prices is not None or document.queue_levels is not None
