@@ -24,20 +24,18 @@ def _aging(seed: int, num_satellites: int) -> Problem:
     return with_objective(problem, Objective(collected_share=0.0, half_life_s=300.0))
 
 
-def _first(name: str) -> Strategy:
+def _strategy(name: str) -> Strategy:
     (found,) = [one for one in STRATEGIES if one.name == name]
     return found
 
 
 @pytest.mark.parametrize("num_satellites", [1, 2, 4])
-def test_images_that_age_are_first_planned_by_forward_search(
-    num_satellites: int,
-) -> None:
+def test_images_that_age_are_first_planned_by_forward_search(num_satellites: int) -> None:
     """The rule alone earns less: it waits until the recorder is nearly full."""
     rule_alone = with_forward_search = 0.0
     for seed in range(6):
         problem = _aging(seed, num_satellites)
-        strategies = [_first("rule"), _first("forward search")]
+        strategies = [_strategy("rule"), _strategy("forward search")]
         less, more = (Incumbent(problem, Budget(), 0.0) for _ in range(2))
         Search(less, 0, strategies[:1]).solved()
         Search(more, 0, strategies).solved()

@@ -124,8 +124,9 @@ def forward_search(search: Search) -> Iterator[None]:
     """Plan by forward search, and replan windows with its contacts, before bounds take long.
 
     Forward search takes every contact that it can, so images come down early; the rule waits until
-    the recorder is nearly full. Four satellites over 1,000 targets, with a half-life of 1 h, earn
-    460 after 3 s this way, and 302 after 15 s by a plan in which images keep their worth.
+    the recorder is nearly full. Four satellites over 1,000 targets, images 30 s apart, with a
+    half-life of 1 h, earn 494 after 5 s this way, and without it the rule's 218 for 15 s, until
+    there is a plan in which images keep their worth.
     """
     best, engine = search.best, search.engine(ResourceSearch)
     # What it reports on the way are not yet plans that the referee has judged.
