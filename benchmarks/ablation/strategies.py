@@ -17,6 +17,7 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.resource_search import ResourceWindows
 from planner_core.certified.strategies import every
 from planner_core.certified.tuning import TUNING, tune
+from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 
 ENGINE: Final = "planner_core.certified"
@@ -107,6 +108,11 @@ def _unchanged(_best: Incumbent, plan: Plan, _seed: int) -> Plan:
     return plan
 
 
+def _never(_problem: Problem) -> bool:
+    """Say no."""
+    return False
+
+
 def _off(module: str, name: str, value: Callable[..., Any]) -> tuple[Patch, ...]:
     return (Patch(module=f"{ENGINE}.{module}", name=name, value=value),)
 
@@ -150,6 +156,7 @@ _UNEVEN: Final = {
     "quality-sun-network-8x1000": 20.0, "weights-fleet-4x2000": 20.0,
     "weights-share-sun-fleet-4x500": 15.0,
 }  # fmt: skip
+_TRAIN: Final = {"share-sun-train-4x500": 20.0}
 _LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
 _SMALL: Final = {"tight-150": 10.0, "tight-weights-300": 10.0, "physical-200": 10.0}
 
@@ -171,7 +178,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "choices": _RESOURCES | _DELIVERED,
             "windows and choices": _RESOURCES,
             "choices from the best plan": _RESOURCES | _CLOUDS,
-            "whole relaxation": _CLOUDS,
+            "whole relaxation": _CLOUDS | {"share-sun-250": 15.0},
+            "a fleet's contacts exchanged": _TRAIN,
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,
             "programs with the plan's contacts": _OWN_CONTACTS,
@@ -194,6 +202,9 @@ STRATEGIES: Final[Mapping[str, Change]] = {
     "windows of forward search's plan": Change(
         patches=_off("strategies.half_life", "bettered_with_its_contacts", _unchanged),
         families=_SOON_OLD_SHARED,
+    ),
+    "a fleet's whole relaxation": Change(
+        patches=_off("strategies.relaxed", "charges_for_data_left", _never), families=_TRAIN
     ),
     "preference": Change(tuning={"preference": 0.0}, families=_LARGE_FLEET, num_draws=1),
     "relaxations of a fleet's contacts": Change(

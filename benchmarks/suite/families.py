@@ -30,6 +30,7 @@ _FLEET_START: Final = datetime(2020, 1, 1, tzinfo=UTC)
 _TARGETS_PER_TOWN: Final = 10
 _TOWN_SPREAD_DEG: Final = 3.0
 _HIGHEST_TOWN_LAT_DEG: Final = 60.0
+_APART_DEG: Final = 12.0  # in a train, along the orbit
 _COLLECTED: Final = Objective.collected()
 _DELIVERED: Final = Objective.delivered()
 _OFF_NADIR: Final = Quality(off_nadir_deg=((0.0, 1.0), (30.0, 0.9), (50.0, 0.5)))
@@ -72,6 +73,8 @@ class Family:
         Whether satellites charge only between turns to the sun and back.
     num_stations
         How many stations are drawn over the land; by default the paper's two.
+    is_train
+        Whether satellites follow each other in one plane, so that their passes overlap.
     """
 
     num_targets: int
@@ -89,6 +92,7 @@ class Family:
     has_quality: bool = False
     turns_to_sun: bool = False
     num_stations: int | None = None
+    is_train: bool = False
 
 
 FAMILIES: Final[Mapping[str, Family]] = {
@@ -176,6 +180,11 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "share-sun-network-8x1000": Family(
         num_satellites=8, num_targets=1000, budget_s=20.0, quick_budget_s=None,
         dynamics="physical", objective=_shared(0.9), turns_to_sun=True, num_stations=30,
+    ),
+    "share-sun-train-4x500": Family(
+        num_satellites=4, num_targets=500, budget_s=20.0, quick_budget_s=None, num_draws=3,
+        dynamics="physical", objective=_shared(0.9), turns_to_sun=True, num_stations=1,
+        is_train=True,
     ),
     "quality-sun-network-4x300": Family(
         num_satellites=4, num_targets=300, budget_s=15.0, quick_budget_s=None,
@@ -274,7 +283,7 @@ def scenario_of(family: Family, draw: int) -> Scenario:
         scenario = replace(
             scenario,
             horizon=Horizon(start=_FLEET_START, end=_FLEET_START + timedelta(days=1)),
-            satellites=fleet(family.num_satellites),
+            satellites=(_train if family.is_train else fleet)(family.num_satellites),
             targets=towns(family.num_targets, draw),
         )
     if family.has_random_rewards:
@@ -309,10 +318,15 @@ def warm_up_of(family: Family) -> Scenario:
 
 def fleet(number: int) -> tuple[Satellite, ...]:
     """Return satellites in evenly spread planes, each with 1 deg/s and 15 s to settle."""
-    return tuple(_fleet_satellite(i, 360.0 * i / number) for i in range(number))
+    return tuple(_fleet_satellite(i, 360.0 * i / number, 180.0 * i / number) for i in range(number))
 
 
-def _fleet_satellite(index: int, raan_deg: float) -> Satellite:
+def _train(number: int) -> tuple[Satellite, ...]:
+    """Return the same satellites, each some minutes behind the one before it."""
+    return tuple(_fleet_satellite(i, 0.0, _APART_DEG * i) for i in range(number))
+
+
+def _fleet_satellite(index: int, raan_deg: float, mean_anomaly_deg: float) -> Satellite:
     orbit = OrbitElements(
         name=f"Spacecraft {index + 1}",
         norad_cat_id=index + 1,
@@ -323,7 +337,7 @@ def _fleet_satellite(index: int, raan_deg: float) -> Satellite:
         inclination_deg=97.4,
         raan_deg=raan_deg,
         arg_perigee_deg=0.0,
-        mean_anomaly_deg=raan_deg / 2.0,
+        mean_anomaly_deg=mean_anomaly_deg,
     )
     return Satellite(
         id=f"s{index + 1}",

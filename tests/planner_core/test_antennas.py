@@ -191,7 +191,8 @@ def test_a_fleet_over_one_station_is_bounded_by_what_it_brings_down(
     search = ResourceSearch(Incumbent(problem, Budget(), 0.0), 0)
     contacts = np.flatnonzero(problem.opportunities.kind == CONTACT)
     search.offer(Plan.of(problem, np.setdiff1d(np.arange(18), contacts[1:])))
-    with tuned(several=1):
+    # As if the fleet were too large for the relaxation of the whole program.
+    with tuned(several=1, most_relaxed=0):
         ascent = FleetAscent(search)
         while not ascent.is_settled:
             ascent.step()

@@ -17,9 +17,10 @@ from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.mip.highs import Engine, Outcome
 from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.mip.whole_relaxation import whole_relaxation
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.certified.strategies import whole_program
-from planner_core.certified.strategies.whole_program import WholeProgram, relaxation_bound
+from planner_core.certified.strategies.whole_program import WholeProgram
 from planner_core.domain import Agility, Dynamics, Objective
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import (
@@ -131,7 +132,7 @@ def test_no_plan_beats_the_relaxation(
 ) -> None:
     problem = varied_problem(seed, dynamics, num_satellites, scarce=TIGHT, has_quality=has_quality)
     best = best_reward(problem)
-    bound = relaxation_bound(problem, Budget(), 0)
+    bound = whole_relaxation(problem, Budget(), 0).bound
     assert best - 1e-6 <= bound.value < np.inf
     assert not problem.has_better_images or has_quality
 

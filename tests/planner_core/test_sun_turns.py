@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from planner_core.budget import Budget
 from planner_core.certified.dp.energy_labels import energy_levels, most_by_energy
 from planner_core.certified.dp.resource_network import network_of
+from planner_core.certified.mip.whole_relaxation import whole_relaxation
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
-from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.domain import Agility, Horizon, Resources, Scenario
 from planner_core.errors import InvalidScenario
 from planner_core.mdp.resource_columns import STRICT, take
@@ -188,7 +188,7 @@ def test_no_plan_beats_the_bounds(seed: int, num_satellites: int) -> None:
     assert resource_value(problem, np.zeros(len(prices)), 1.0) >= best - 1e-6
     if replay(problem, Plan(())).is_valid:
         # If the idle load alone empties the battery HiGHS has no plan to bound.
-        assert relaxation_bound(problem, Budget(), 0).value >= best - 1e-6
+        assert whole_relaxation(problem, Budget(), 0).bound.value >= best - 1e-6
 
 
 @examples(300)

@@ -43,12 +43,18 @@ _CORNER: Final[Mapping[str, str | float]] = {
 
 
 class _Point(NamedTuple):
-    """An optimum of a relaxation, with its row duals and reduced costs."""
+    """An optimum of a relaxation, with its row duals and reduced costs.
+
+    Attributes
+    ----------
+    gains
+        What each column would gain per unit more; less than 0 if that would lose.
+    """
 
     value: float
     columns: Floats
     row_duals: Floats
-    losses: Floats
+    gains: Floats
 
 
 class _Engine(Engine):
@@ -101,7 +107,7 @@ class _Engine(Engine):
             value=value,
             columns=np.array(solution.col_value),
             row_duals=self.row_duals,
-            losses=np.abs(np.array(solution.col_dual)),
+            gains=np.array(solution.col_dual),
         )
 
 
@@ -156,7 +162,7 @@ class FixedContacts:
         self._engine = self._new_engine()
         self._cuts: list[Rows] = []
         self._fixed = fixed
-        self._point: Floats | None = None  # of the last relaxation
+        self._point: _Point | None = None  # of the last corner
 
     def relaxation(self, num_rounds: int = TUNING.tries) -> Relaxation:
         """Return the results of the relaxation, with dual values amid all that prove it.
@@ -171,22 +177,44 @@ class FixedContacts:
         point = self._cut(num_rounds, self._engine.central)
         if point is not None:
             multipliers = self._model.target_multipliers(point.row_duals)
-            losses[self._rows] = point.losses[: len(self._rows)]
+            losses[self._rows] = np.abs(point.gains[: len(self._rows)])
         value = -np.inf if point is None else point.value
         return Relaxation(value=value, multipliers=multipliers, losses=losses)
 
     def relaxed(self) -> float:
         """Return the worth of a corner of the relaxation, which becomes the start for ``plan``."""
-        point = self._cut(TUNING.several, self._engine.corner)
-        self._point = None if point is None else point.columns
+        point = self._point = self._cut(TUNING.several, self._engine.corner)
         return -np.inf if point is None else point.value
+
+    @property
+    def gains(self) -> Floats:
+        """What the last corner would gain by more of each opportunity; 0 if not in the program.
+
+        Shape ``(n,)``.
+        """
+        gains = np.zeros(len(self._problem.opportunities))
+        if self._point is not None:
+            gains[self._rows] = self._point.gains[: len(self._rows)]
+        return gains
+
+    def promising(self, size: int) -> Bools:
+        """Return the tasks that cost the last corner least, those that it takes in part first.
+
+        Shape ``(n,)``.
+        """
+        promising = np.zeros(len(self._problem.opportunities), dtype=np.bool_)
+        if self._point is not None:
+            taken, gains = (
+                each[: len(self._rows)] for each in (self._point.columns, self._point.gains)
+            )
+            promising[self._rows[np.lexsort((-taken, np.abs(gains)))[:size]]] = True
+        return promising
 
     def turn_aside(self, rng: np.random.Generator) -> None:
         """Move to another corner of the relaxation that is worth about as much."""
         worth = np.concatenate(self._model.program.worth)
         self._engine.weigh(worth * (1.0 + TUNING.trifle * rng.random(len(worth))))
-        point = self._engine.corner()
-        self._point = None if point is None else point.columns
+        self._point = self._engine.corner()
         self._engine.weigh(worth)
 
     def fix(self, contacts: tuple[int, ...]) -> None:
@@ -260,7 +288,8 @@ class FixedContacts:
         if is_rounded:
             engine.look_no_further()
         max_nodes = 0 if is_rounded else TUNING.highs_nodes
-        outcome = engine.search(self._point, 0.0, TUNING.highs_effort, _unwatched, max_nodes)
+        start = None if self._point is None else self._point.columns
+        outcome = engine.search(start, 0.0, TUNING.highs_effort, _unwatched, max_nodes)
         if outcome.columns is None:
             return None
         return Plan.of(self._problem, self._rows[outcome.columns[: len(self._rows)] > 0.5])

@@ -58,6 +58,7 @@ class Engine:
         self._budget = budget
         self._bound = float("inf")
         self._incumbent: Floats | None = None
+        self._gains = np.zeros(program.num_columns)
         self._is_abandoned = False
         self._messages: list[str] = []
         self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]  # it has no types
@@ -116,7 +117,9 @@ class Engine:
         # The duals prove the value up to the infeasibility HiGHS tolerates, on columns up to one.
         doubt = float(info.sum_dual_infeasibilities) + SAME + self._left_out
         self._bound = min(self._bound, float(info.objective_function_value) + doubt)
-        return np.array(self._highs.getSolution().col_value)
+        solution = self._highs.getSolution()
+        self._gains = np.array(solution.col_dual)
+        return np.array(solution.col_value)
 
     @property
     def bound(self) -> float:
@@ -128,6 +131,14 @@ class Engine:
         """What the last relaxation would gain per unit of each row's limit."""
         multipliers: Floats = np.abs(np.array(self._highs.getSolution().row_dual))
         return multipliers
+
+    @property
+    def gains(self) -> Floats:
+        """What the last corner would gain per unit more of each column; below 0 if it loses.
+
+        0 if none was found. Shape ``(num_columns,)``.
+        """
+        return self._gains
 
     @property
     def log(self) -> str:

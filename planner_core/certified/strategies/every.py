@@ -35,6 +35,7 @@ from planner_core.certified.strategies.supports import (
     is_aging_in_programs,
     is_aging_on_board,
     is_alone_with_limits,
+    is_fleet,
     is_large_free_fleet,
     is_shared,
     is_shared_and_aging_in_programs,
@@ -148,12 +149,6 @@ STRATEGIES: Final = (
         patience=lambda: TUNING.tries,
     ),
     Strategy(
-        name="a small fleet's programs with contacts fixed",
-        supports=is_small_and_shared,
-        slices=resources.programs,
-        patience=lambda: TUNING.several,
-    ),
-    Strategy(
         name="choices",
         supports=is_alone_with_limits,
         slices=resources.choices,
@@ -174,8 +169,14 @@ STRATEGIES: Final = (
     ),
     Strategy(
         name="whole relaxation",
-        supports=is_alone_with_limits,
+        supports=lambda p: has_steady_worth(p) and not is_fleet(p),
         slices=resources.whole_relaxation,
+    ),
+    Strategy(
+        name="a small fleet's programs with contacts fixed",
+        supports=is_small_and_shared,
+        slices=resources.programs,
+        patience=lambda: TUNING.several,
     ),
     Strategy(
         name="multipliers",
@@ -192,6 +193,13 @@ STRATEGIES: Final = (
         name="programs with contacts fixed",
         supports=is_alone_with_limits,
         slices=resources.programs,
+        patience=lambda: TUNING.several,
+    ),
+    Strategy(
+        name="a fleet's contacts exchanged",
+        supports=lambda p: is_shared_with_limits(p) and p.use_resources,
+        slices=resources.exchanged_contacts,
+        begin=Begin.STALLED,
         patience=lambda: TUNING.several,
     ),
     # Images that lose worth as they age.

@@ -10,7 +10,7 @@ import numpy as np
 
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.mip.antenna_multipliers import antenna_multipliers
+from planner_core.certified.mip.antenna_multipliers import AntennaMultipliers, antenna_multipliers
 from planner_core.certified.mip.program_search import ProgramSearch
 from planner_core.certified.mip.solution_pool import PlanPool
 from planner_core.certified.multipliers.ascent import Ascent, Steps
@@ -47,9 +47,11 @@ def plans_and_programs(search: Search) -> Iterator[None]:
         yield
     if search.best.is_done:
         return
-    programs = ProgramSearch(
-        search.problem, plans.pool, engine.resource_ascent, ascent, search.budget, search.seed
-    )
+    programs = None
+    if ascent.exact is not None:
+        programs = ProgramSearch(
+            search.problem, plans.pool, ascent.exact, ascent, search.budget, search.seed
+        )
     # For a small fleet, programs for sets of contacts and the whole one follow when this ends.
     patience = TUNING.fleet_patience if is_fleet(engine.problem) else TUNING.patience
     num_idle = 0
@@ -78,7 +80,7 @@ class FleetPlans:
             self._ascent = FleetAscent(search)
         return self._ascent
 
-    def go_on(self, search: ResourceSearch, other: FleetAscent | ProgramSearch) -> bool:
+    def go_on(self, search: ResourceSearch, other: FleetAscent | ProgramSearch | None) -> bool:
         """Run the search for plans and another side by side; return whether a plan is better.
 
         The search for plans takes none from the other or the pool, as these would lead it nowhere
@@ -87,18 +89,18 @@ class FleetPlans:
         best, alternating = self._best, search.alternating_search
         if best.reward > self._known:
             alternating.adopt(best.plan)
+        steps = TUNING.steps_beside if other is None else other.steps_beside
         with side_by_side(best.budget.num_threads) as together:
-            together(
-                partial(alternating.step, other.steps_beside), partial(self._merge_after, other)
-            )
+            together(partial(alternating.step, steps), partial(self._merge_after, other))
         self.pool.learn(alternating.ended, alternating.plan)
         is_better = [search.offer(plan) for plan in (alternating.plan, self.pool.plan)]
         best.report("plans")
         self._known = best.reward
         return any(is_better)
 
-    def _merge_after(self, other: FleetAscent | ProgramSearch) -> None:
-        other.step()
+    def _merge_after(self, other: FleetAscent | ProgramSearch | None) -> None:
+        if other is not None:
+            other.step()
         self.pool.merge()
 
 
@@ -159,22 +161,42 @@ class FleetAscent:
             usage[:] = 0.0
             search.ask_energy(energy)
         yield beside_ascent
-        ascent, _ = search.begin_ascent(energy)
-        known = search.best.bound
+        value, multipliers = search.before_ascent(energy)
         # If batteries alone allow so much more than a plan earns, recorders are full: multipliers
         # that account for them prove more.
         is_far = search.best.reward < (1.0 - TUNING.tight) * energy.value
         if is_far:
+            yield beside_ascent
+            search.whole.solve()
+        if search.whole.proves_more_than(value) and not is_fleet(search.problem):
+            return
+        ascent = search.begin_ascent(value, multipliers)
+        yield from self._ascend_exactly(ascent, energy, is_far=is_far)
+        yield TUNING.steps_beside
+        search.whole.solve()
+
+    def _ascend_exactly(
+        self, ascent: ResourceAscent, energy: Ascent, *, is_far: bool
+    ) -> Iterator[int]:
+        """Lower the bound by the exact programmes."""
+        search, known = self._search, self._search.best.bound
+        if is_far:
             yield from self._go_by_plan(energy, ascent)
         search.ascend(ascent, 1)
         self.exact = ascent
-        wants_antennas = ascent.wants_antennas and search.problem.counts_delivery
-        if wants_antennas and (yield from self._ascend_on_antennas(ascent, known)):
-            yield from self._prove_finely(ascent)
-            return
+        if ascent.wants_antennas and search.problem.counts_delivery:
+            paid = self._antenna_multipliers(ascent)
+            if paid is not None:
+                yield TUNING.steps_beside
+                search.whole.solve()
+                if search.whole.proves_more_than(ascent.value):
+                    return
+            if (yield from self._ascend_on_antennas(ascent, paid, known)):
+                yield from self._prove_finely(ascent)
+                return
         if not is_far and ascent.value < (1.0 - TUNING.worth_a_step) * energy.value:
             yield from self._go_by_plan(energy, ascent)
-        yield beside_ascent
+        yield TUNING.steps_beside if is_fleet(search.problem) else TUNING.tries
         search.ascend(ascent, 1)
         if search.problem.counts_delivery:
             yield from self._prove_finely(ascent)
@@ -205,21 +227,33 @@ class FleetAscent:
         ascent.count_finely(self._search.best.plan)
         self._search.ascend(ascent, 1)
 
+    def _antenna_multipliers(self, ascent: ResourceAscent) -> AntennaMultipliers | None:
+        """Return what antennas are worth if not all images can come down; else None."""
+        search = self._search
+        plan = search.mask(action.opportunity for action in search.best.plan.actions)
+        choices = plan, ascent.latest
+        return antenna_multipliers(
+            search.problem, ascent.satellites, choices, search.budget, search.seed
+        )
+
     def _ascend_on_antennas(
-        self, ascent: ResourceAscent, known: Bound
+        self, ascent: ResourceAscent, paid: AntennaMultipliers | None, known: Bound
     ) -> Generator[int, None, bool]:
         """Lower the bound by multipliers of antennas; return whether that succeeded.
 
         Parameters
         ----------
+        paid
+            Multipliers to try first.
         known
             An earlier bound: its multipliers are better if recorders limit more than batteries.
         """
         if known.unit is not None and known.multipliers is not None and known.value < ascent.value:
             ascent.restart(known.multipliers)
-        at_first = min(known.value, ascent.value)
-        paid = yield from self._pay_for_volume(ascent, at_first)
-        is_paid, at_first = paid < at_first, paid
+        at_first, is_paid = min(known.value, ascent.value), False
+        if paid is not None:
+            lower = yield from self._pay_for_volume(ascent, paid, at_first)
+            is_paid, at_first = lower < at_first, lower
         if not self._search.problem.objective.is_delivered:
             # If images earn a share on board, further steps gain too little for the time they take.
             return is_paid
@@ -244,7 +278,7 @@ class FleetAscent:
         return True
 
     def _pay_for_volume(
-        self, ascent: ResourceAscent, at_first: float
+        self, ascent: ResourceAscent, paid: AntennaMultipliers, at_first: float
     ) -> Generator[int, None, float]:
         """Try multipliers at which contacts pay for all that images earn by coming down.
 
@@ -254,13 +288,6 @@ class FleetAscent:
         """
         search = self._search
         began = ascent.multipliers, ascent.antenna_multipliers
-        plan = search.mask(action.opportunity for action in search.best.plan.actions)
-        choices = plan, ascent.latest
-        paid = antenna_multipliers(
-            search.problem, ascent.satellites, choices, search.budget, search.seed
-        )
-        if paid is None:
-            return at_first
         best = at_first * (1.0 - TUNING.worth_a_step), *began
         for share in (paid.share, search.problem.objective.collected_share):
             yield TUNING.steps_beside

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,13 +23,19 @@ from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.bound import Bound, rounded_bound
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.latency import latency_value
-from planner_core.certified.sizes import MAX_PAIRS
+from planner_core.certified.strategies.relaxed import Relaxed
 from planner_core.certified.strategies.supports import is_large
-from planner_core.certified.strategies.whole_program import relaxation_bound
 from planner_core.certified.tuning import TUNING
-from planner_core.precedence.relation import num_near_pairs
 from planner_core.problem import CONTACT, Bools, Floats
 from planner_core.problem.plan import Plan
+
+
+class _Begun(NamedTuple):
+    """What batteries or recorders alone prove, its multipliers, and if an ascent lowered it."""
+
+    value: float
+    multipliers: Floats
+    has_fallen: bool
 
 
 class ResourceSearch:
@@ -41,6 +48,7 @@ class ResourceSearch:
         # By contacts and number of tasks offered: the worth that no plan was found to have.
         self._missed: dict[tuple[tuple[int, ...], int], float] = {}
         self._unrounded = np.inf  # the bound before it was rounded
+        self.whole = Relaxed(best, seed)
         self._one = self.problem.typical_worth
         self._agility_decides = False
         self._brought_down: set[Plan] = set()  # plans already tried with further contacts
@@ -120,20 +128,6 @@ class ResourceSearch:
         more = brought_down(self.problem, plan, self.budget, self.best.judge)
         return (more is not plan and self.best.offer(more)) or is_better
 
-    def relax_whole(self) -> None:
-        """Bound plans by the whole program's relaxation, if images of a target differ in worth.
-
-        Then the exact programmes lose by rounding each image to whole units, and the relaxation is
-        nearly tight. If all images of a target earn the same, the programmes prove as much or more.
-        """
-        is_too_large = len(self.problem.opportunities) > TUNING.most_columns
-        if is_too_large or not self.problem.has_better_images:
-            return
-        if num_near_pairs(self.problem) > MAX_PAIRS:
-            return
-        self.best.lower(relaxation_bound(self.problem, self.budget, self.seed))
-        self.best.report("relaxation")
-
     def mask(self, rows: Iterable[int]) -> Bools:
         """Return a mask of these opportunities. Shape ``(n,)``."""
         mask = np.zeros(len(self.problem.opportunities), dtype=np.bool_)
@@ -163,11 +157,24 @@ class ResourceSearch:
     def resource_ascent(self) -> ResourceAscent:
         """The exact search for multipliers, which starts from those of battery or recorder alone.
 
-        Solving by the battery alone takes a fiftieth of the time; if its ascent hardly lowers the
-        value, the exact programme is not run at its multipliers either.
+        If their ascent hardly lowers the value, the exact programme is not run at its multipliers.
         """
         if self._ascent is not None:
             return self._ascent
+        begun = self._begun
+        ascent = self.begin_ascent(begun.value, begun.multipliers)
+        if begun.has_fallen:
+            self.ascend(ascent, 1)
+        return ascent
+
+    @property
+    def relaxation_suffices(self) -> bool:
+        """Whether the whole relaxation proves more than the exact programmes' first multipliers."""
+        return self.whole.is_known and self.whole.proves_more_than(self._begun.value)
+
+    @cached_property
+    def _begun(self) -> _Begun:
+        """Solve by the battery and the recorder alone, which takes a fiftieth of the time."""
         paths = EnergyPaths(self.problem)
         energy = ascent_on_energy(
             self.problem, paths, self.multipliers(), TUNING.many_epochs, self.seed
@@ -175,24 +182,22 @@ class ResourceSearch:
         energy.ask()
         before = energy.value
         self.ask_energy(energy)
-        ascent, value = self.begin_ascent(energy)
-        if value < before - TUNING.worth_a_step * before:
-            self.ascend(ascent, 1)
-        return ascent
+        value, multipliers = self.before_ascent(energy)
+        return _Begun(value, multipliers, value < before - TUNING.worth_a_step * before)
 
-    def begin_ascent(self, energy: Ascent) -> tuple[ResourceAscent, float]:
-        """Begin the exact search for multipliers after an ascent; return it and the known value.
-
-        If it has begun already, the same search is returned.
-        """
+    def before_ascent(self, energy: Ascent) -> tuple[float, Floats]:
+        """Return what batteries or recorders alone prove, and the multipliers for that."""
         self.prove_by_energy(energy)
-        value, multipliers = self.ask_data(energy)
+        return self.ask_data(energy)
+
+    def begin_ascent(self, value: float, multipliers: Floats) -> ResourceAscent:
+        """Begin the exact search for multipliers; if it has begun, return the same search."""
         if self._ascent is None:
             self._ascent = ResourceAscent(
                 self.problem, min(self.best.bound.value, value), multipliers, self.budget.stop
             )
             self._ascent.learn(self.best.plan)
-        return self._ascent, value
+        return self._ascent
 
     def ask_energy(self, energy: Ascent) -> None:
         """Seek better multipliers by energy alone, for some epochs."""

@@ -16,9 +16,10 @@ from planner_core.budget import ignored
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.choices import ChoiceSearch
+from planner_core.certified.mip.contact_exchange import ContactExchange
 from planner_core.certified.proofs.resource_bound import quick_bound
 from planner_core.certified.strategies.resource_steps import ResourceSearch
-from planner_core.certified.strategies.supports import at_rest
+from planner_core.certified.strategies.supports import at_rest, is_shared
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Bools
 
@@ -72,6 +73,23 @@ def own_contacts(search: Search) -> Iterator[None]:
         yield
 
 
+def exchanged_contacts(search: Search) -> Iterator[None]:
+    """Seek better plans with one contact exchanged, by small programs.
+
+    Plans within a thousandth of the bound are left to the whole program, which may prove them.
+    """
+    engine = search.engine(ResourceSearch)
+    while (offered := engine.whole.worth_offering()) is None:
+        yield
+    exchange = ContactExchange(search.best, search.seed, offered)
+    while search.is_promising and not search.best.is_within(TUNING.trifle):
+        plan = exchange.step()
+        if plan is not None:
+            engine.offer(plan)
+        search.best.report("contacts exchanged")
+        yield
+
+
 def choices_from_the_best(search: Search) -> Iterator[None]:
     """Replan the whole day by choices of tasks from the best plan, until it is no longer improved.
 
@@ -97,7 +115,7 @@ def choices_from_the_best(search: Search) -> Iterator[None]:
 
 def whole_relaxation(search: Search) -> Iterator[None]:
     """Bound plans by the relaxation of the whole program."""
-    search.engine(ResourceSearch).relax_whole()
+    search.engine(ResourceSearch).whole.solve()
     yield
 
 
@@ -112,8 +130,13 @@ def multipliers(search: Search) -> Iterator[None]:
 
 
 def programs(search: Search) -> Iterator[None]:
-    """Relax sets of contacts, and seek better plans by small programs with one of them."""
+    """Relax sets of contacts, and seek better plans by small programs with one of them.
+
+    If the whole relaxation proves more, a fleet only exchanges contacts.
+    """
     engine = search.engine(ResourceSearch)
+    if is_shared(search.problem) and engine.relaxation_suffices:
+        return
     while search.is_promising:
         is_new = engine.relax_sets(engine.resource_ascent, engine.alternating_search)
         if is_new:

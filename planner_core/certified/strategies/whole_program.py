@@ -16,8 +16,7 @@ from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.lns.search import improved
-from planner_core.certified.mip.clique_cuts import violated_cliques
-from planner_core.certified.mip.highs import Engine, Outcome, Watch
+from planner_core.certified.mip.highs import Engine, Outcome
 from planner_core.certified.mip.model import (
     Formulation,
     OnBoard,
@@ -25,7 +24,7 @@ from planner_core.certified.mip.model import (
     binding_losses,
     plan_program,
 )
-from planner_core.certified.mip.program import Rows
+from planner_core.certified.mip.whole_relaxation import cut_by_cliques
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.sizes import MAX_PAIRS, PAUSE_S
 from planner_core.certified.tolerances import INSIDE, TOUCHING
@@ -119,7 +118,7 @@ class WholeProgram:
             report(max(reward, best.reward), bound)
 
         if self.formulation == "antichain":
-            _cut(engine, problem, model, self.cut_rounds, watch)
+            cut_by_cliques(engine, model, self.cut_rounds, watch)
         return engine.search(_columns(best, model), best.gap, None, watch, unit=best.unit)
 
 
@@ -154,20 +153,6 @@ def _ask(search: Search, share: float) -> None:
     best.report("HiGHS")
 
 
-def relaxation_bound(problem: Problem, budget: Budget, seed: int) -> Bound:
-    """Return the bound by the linear relaxation of the whole program."""
-    # Counting images that stay on board takes three times as long, and lowers nothing: fractions
-    # of images come down.
-    model = plan_program(problem, "antichain", TOUCHING, on_board="worth the same")
-    engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
-    _cut(engine, problem, model, TUNING.patience, _unwatched)
-    return Bound(value=engine.bound, proof="milp", log=engine.log)
-
-
-def _unwatched(_reward: float, _bound: float) -> None:
-    pass
-
-
 def _starts(problem: Problem, budget: Budget) -> list[Plan]:
     """Return the plans of the quick solvers; that of the quickest whatever the budget."""
     if budget.is_cancelled:
@@ -177,28 +162,6 @@ def _starts(problem: Problem, budget: Budget) -> list[Plan]:
         if not budget.is_spent():
             plans.append(solver.solve(problem, budget, 0).plan)
     return plans
-
-
-def _cut(engine: Engine, problem: Problem, model: PlanProgram, rounds: int, watch: Watch) -> None:
-    """Add violated clique cuts while they lower the bound noticeably."""
-    bounds: list[float] = []
-    for _ in range(rounds):
-        taken = engine.relaxed()
-        if taken is None:
-            return
-        watch(-np.inf, engine.bound)
-        bounds.append(engine.bound)
-        trifle = TUNING.little**2 * bounds[-1]
-        if len(bounds) > TUNING.several and bounds[-1 - TUNING.several] - bounds[-1] < trifle:
-            return
-        num_added = 0
-        for satellite, precedence in zip(problem.satellites, model.precedences, strict=True):
-            own = model.taken[satellite.rows]
-            offsets, members = violated_cliques(precedence, taken[own])
-            engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
-            num_added += len(offsets) - 1
-        if num_added == 0:
-            return
 
 
 def _plan_of(problem: Problem, outcome: Outcome) -> Plan:
