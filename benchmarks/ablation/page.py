@@ -45,6 +45,7 @@ from the engine, unless they are missed elsewhere; their rows stay, with the rev
 them. `exhaust` matters only on smaller missions: of 240 drawn as in the tests, all were closed with
 it and 222 without. `preference` saves time on the 24 satellites of `benchmarks/fleet`: they are
 within 1.5 % after 28, 36 and 41 CPU seconds without it, after 35, 20 and 27 with it (seeds 0 to 2).
+`a fleet's contacts exchanged` matters for real satellites over few stations (docs/bounds.md).
 The strategy `windows of the first plan` is now a part of `forward search`.
 """
 
