@@ -51,6 +51,12 @@ class Engine:
     HiGHS runs in its own thread. Once the budget is spent it stops at its next callback, for which
     callers wait only briefly. If that does not suffice, the run is abandoned and never touched
     again, and its thread ends at that callback.
+
+    Attributes
+    ----------
+    columns, gains
+        The last corner of the relaxation, and what it would gain per unit more of each column
+        (below 0 if that would lose); 0 as long as none was found. Shape ``(num_columns,)``.
     """
 
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
@@ -58,7 +64,7 @@ class Engine:
         self._budget = budget
         self._bound = float("inf")
         self._incumbent: Floats | None = None
-        self._gains = np.zeros(program.num_columns)
+        self.columns, self.gains = np.zeros((2, program.num_columns))
         self._is_abandoned = False
         self._messages: list[str] = []
         self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]  # it has no types
@@ -118,8 +124,8 @@ class Engine:
         doubt = float(info.sum_dual_infeasibilities) + SAME + self._left_out
         self._bound = min(self._bound, float(info.objective_function_value) + doubt)
         solution = self._highs.getSolution()
-        self._gains = np.array(solution.col_dual)
-        return np.array(solution.col_value)
+        self.columns, self.gains = np.array(solution.col_value), np.array(solution.col_dual)
+        return self.columns
 
     @property
     def bound(self) -> float:
@@ -131,14 +137,6 @@ class Engine:
         """What the last relaxation would gain per unit of each row's limit."""
         multipliers: Floats = np.abs(np.array(self._highs.getSolution().row_dual))
         return multipliers
-
-    @property
-    def gains(self) -> Floats:
-        """What the last corner would gain per unit more of each column; below 0 if it loses.
-
-        0 if none was found. Shape ``(num_columns,)``.
-        """
-        return self._gains
 
     @property
     def log(self) -> str:

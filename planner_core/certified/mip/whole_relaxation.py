@@ -16,7 +16,7 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.tolerances import TOUCHING
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import is_transitive
-from planner_core.problem import COLLECT, Floats, Problem
+from planner_core.problem import COLLECT, Longs, Problem
 
 
 class WholeRelaxation(NamedTuple):
@@ -26,12 +26,13 @@ class WholeRelaxation(NamedTuple):
     ----------
     bound
         What it proves.
-    losses
-        Reduced costs of opportunities; 0 if time was too short. Shape ``(n,)``.
+    order
+        Opportunities from the one that costs least on, those first that are taken in part.
+        Shape ``(n,)``.
     """
 
     bound: Bound
-    losses: Floats
+    order: Longs
 
 
 def whole_relaxation(problem: Problem, budget: Budget, seed: int) -> WholeRelaxation:
@@ -44,9 +45,10 @@ def whole_relaxation(problem: Problem, budget: Budget, seed: int) -> WholeRelaxa
     model = plan_program(problem, "antichain", TOUCHING, on_board=on_board)
     engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
     cut_by_cliques(engine, model, TUNING.patience, _unwatched)
+    n = len(problem.opportunities)
     return WholeRelaxation(
         bound=Bound(value=engine.bound, proof="milp", log=engine.log),
-        losses=np.abs(engine.gains[: len(problem.opportunities)]),
+        order=np.lexsort((-engine.columns[:n], np.abs(engine.gains[:n]))),
     )
 
 
@@ -56,10 +58,11 @@ def charges_for_data_left(problem: Problem) -> bool:
     Images that earn nothing must cost nothing, so no plan may need any: as a detour, or because it
     is kept.
     """
-    is_kept_image = problem.opportunities.kind[problem.kept_rows] == COLLECT
+    kept = problem.kept_rows
+    is_idle = (problem.opportunities.kind[kept] == COLLECT) & (problem.worth[kept] <= 0.0)
     return (
         is_transitive(problem)
-        and not is_kept_image.any()
+        and not is_idle.any()
         and any(left_cost(problem, one) > 0.0 for one in problem.satellites if len(one))
     )
 

@@ -56,14 +56,15 @@ class Relaxed:
     def worth_offering(self) -> Bools | None:
         """Return the tasks to offer a program with contacts fixed; None if not known yet.
 
-        All of them, or the ones of least reduced cost in the relaxation. Shape ``(n,)``.
+        All of them, or those of the plan and the ones of least reduced cost in the relaxation.
+        Shape ``(n,)``.
         """
         problem = self._best.problem
         if fits_a_program(problem):
             return np.ones(len(problem.opportunities), dtype=np.bool_)
         if self._relaxation is None:
             return None
-        losses = self._relaxation.losses
-        offered: Bools = losses <= np.sort(losses)[: TUNING.large][-1]
+        offered = np.zeros(len(problem.opportunities), dtype=np.bool_)
+        offered[self._relaxation.order[: TUNING.large]] = True
         offered[[action.opportunity for action in self._best.plan.actions]] = True
         return offered
