@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner_core.problem import Bools, Floats, Longs, Problem
+from planner_core.problem import CONTACT, Bools, Floats, Longs, Problem
 
 
 class Action(NamedTuple):
@@ -70,6 +70,11 @@ class Plan:
         ordered = columns.at(columns.order)
         fields = ordered.start_s, ordered.end_s, ordered.row
         return cls(tuple(map(Action, *(field.tolist() for field in fields))))
+
+    def contacts(self, problem: Problem) -> tuple[int, ...]:
+        """Return the contacts that the plan takes, ascending."""
+        kind = problem.opportunities.kind
+        return tuple(sorted(a.opportunity for a in self.actions if kind[a.opportunity] == CONTACT))
 
     def with_kept(self, problem: Problem) -> Plan:
         """Return the plan with every task that must be taken, missing ones at their own times."""

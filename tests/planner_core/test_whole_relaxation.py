@@ -11,13 +11,16 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.contact_exchange import ContactExchange
 from planner_core.certified.mip.whole_relaxation import charges_for_data_left, whole_relaxation
+from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.certified.strategies.relaxed import Relaxed
 from planner_core.certified.strategies.resource_fleet import FleetAscent
 from planner_core.certified.strategies.resource_steps import ResourceSearch
-from planner_core.certified.tuning import tuned
+from planner_core.certified.strategies.resources import exchanged_contacts
+from planner_core.certified.tuning import TUNING, tuned
 from planner_core.domain import Agility, Dynamics, Objective, Resources
 from planner_core.errors import InvalidScenario
 from planner_core.pinning.apply_pins import apply_pins
@@ -178,6 +181,17 @@ def test_a_pass_goes_to_the_satellite_that_has_more_to_bring_down() -> None:
     assert exchange.step() is None, "nothing is left to try"
 
 
+def test_exchanges_end_if_there_are_no_tasks_to_offer() -> None:
+    """They waited for a relaxation that is never solved: without a time limit, for ever."""
+    problem = _one_pass_for_two_satellites()
+    search = Search(Incumbent(problem, Budget(), 0.0), 0, STRATEGIES)
+    with tuned(most_columns=0, most_relaxed=0):
+        slices = exchanged_contacts(search)
+        next(slices)
+        search.num_idle = TUNING.rounds
+        assert next(slices, "ended") == "ended"
+
+
 @examples(60)
 @given(seed=SEEDS, dynamics=DYNAMICS, collected_share=SHARES)
 def test_reduced_costs_limit_what_an_exchange_gains(
@@ -187,7 +201,7 @@ def test_reduced_costs_limit_what_an_exchange_gains(
     problem = with_objective(problem, Objective(collected_share=collected_share))
     best = Incumbent(problem, Budget(), 0.0, plan=Rule().solve(problem, Budget(), 0).plan)
     exchange = ContactExchange(best, seed, np.ones(len(problem.opportunities), dtype=np.bool_))
-    around = exchange._around(exchange._of(best.plan))
+    around = exchange._around(best.plan.contacts(problem))
     for most, contacts in around:
         exchange._program.fix(contacts)
         assert exchange._program.relaxed() <= most + 1e-6

@@ -42,7 +42,7 @@ class ContactExchange:
     def step(self) -> Plan | None:
         """Try a few exchanges; return a better plan if one leads there."""
         best = self._best
-        contacts = self._of(best.plan)
+        contacts = best.plan.contacts(best.problem)
         if contacts != self._from:
             self._from, self._neighbours = contacts, self._around(contacts)
         for _ in range(TUNING.several):
@@ -59,10 +59,6 @@ class ContactExchange:
                 if plan is not None:
                     return plan
         return None
-
-    def _of(self, plan: Plan) -> Contacts:
-        kind = self._best.problem.opportunities.kind
-        return tuple(sorted(a.opportunity for a in plan.actions if kind[a.opportunity] == CONTACT))
 
     def _around(self, contacts: Contacts) -> list[tuple[float, Contacts]]:
         """Return these contacts, and with one more, less those that exclude it, or with one less.

@@ -27,7 +27,6 @@ from planner_core.certified.strategies.half_life_steps import (
     Contacts,
     bettered_by_windows,
     bettered_with_its_contacts,
-    contacts_of,
 )
 from planner_core.certified.strategies.resource_steps import ResourceSearch
 from planner_core.certified.strategies.resources import (
@@ -146,7 +145,7 @@ def plans_by_contacts(search: Search) -> Iterator[None]:
     if not shared.named:
         yield from choices(search)
     while search.is_promising:
-        own = contacts_of(best.problem, best.plan)
+        own = best.plan.contacts(best.problem)
         offered = (
             *reversed(shared.named),
             *reversed(shared.ascent.contact_sets),

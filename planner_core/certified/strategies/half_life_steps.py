@@ -121,13 +121,6 @@ def bettered_by_windows(best: Incumbent, part: Problem, plan: Plan, seed: int) -
 
 def bettered_with_its_contacts(best: Incumbent, plan: Plan, seed: int) -> Plan:
     """Return a plan improved by replanning windows of it, its contacts taken."""
-    part = with_contacts(
-        best.problem, list(contacts_of(best.problem, plan)), plan, best.judge(plan)
-    )
+    contacts = list(plan.contacts(best.problem))
+    part = with_contacts(best.problem, contacts, plan, best.judge(plan))
     return bettered_by_windows(best, part, plan, seed)
-
-
-def contacts_of(problem: Problem, plan: Plan) -> tuple[int, ...]:
-    """Return the contacts that a plan takes, ascending."""
-    rows = (action.opportunity for action in plan.actions)
-    return tuple(sorted(row for row in rows if problem.opportunities.kind[row] == CONTACT))

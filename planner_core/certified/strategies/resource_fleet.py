@@ -113,7 +113,8 @@ class FleetAscent:
     (``antenna_multipliers``), followed by steps if images count only on the ground. By such steps
     four satellites and two stations have 865 instead of 887, and another four 1,068 instead of
     1,077. Otherwise the relaxation of the plan's contacts accounts for recorders as well, and its
-    multipliers are nearly the best for all contacts.
+    multipliers are nearly the best for all contacts. If images on board earn a share and antennas
+    are short, the relaxation of the whole program proves more.
 
     Attributes
     ----------

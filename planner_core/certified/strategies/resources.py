@@ -80,6 +80,8 @@ def exchanged_contacts(search: Search) -> Iterator[None]:
     """
     engine = search.engine(ResourceSearch)
     while (offered := engine.whole.worth_offering()) is None:
+        if not search.is_promising:
+            return
         yield
     exchange = ContactExchange(search.best, search.seed, offered)
     while search.is_promising and not search.best.is_within(TUNING.trifle):
