@@ -72,7 +72,7 @@ def certified(problem: Problem) -> dict[str, float]:
 def pairwise(problem: Problem) -> dict[str, float]:
     """Return reward and bound of HiGHS on the paper's program, with default settings."""
     from planner_core.certified.mip.highs import Engine
-    from planner_core.certified.mip.model import plan_program
+    from planner_core.certified.program.model import plan_program
 
     program = plan_program(problem, "pairwise", 0.0).program
     engine = Engine(program, _budget(), 0, is_chained=False)
@@ -86,7 +86,7 @@ def pairwise(problem: Problem) -> dict[str, float]:
 
 def groups_of(problem: Problem) -> dict[str, Any]:
     """Return the program for CP-SAT: a group for each set of tasks that exclude each other."""
-    from planner_core.certified.mip.clique_cuts import clique_cover
+    from planner_core.certified.program.clique_cuts import clique_cover
     from planner_core.precedence.relation import direct_precedence
 
     rows, offsets = problem.target_opportunities

@@ -22,7 +22,7 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.highs import Engine
-from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.program.linear_program import Program, Rows
 
 Choice = tuple[int, int]
 """A photograph and the way it is taken (a camera, or 13 for the stereo pair)."""

@@ -1,9 +1,9 @@
 """Plan missions drawn at random, and report faults of the answers.
 
 Every solver plans each mission, and ``certified`` under other objectives too; all plans are judged
-under the mission's own. A fault is a plan that the referee refuses, a bound below a plan, a plan
-better than that of ``certified`` by more than half a percent, or an answer of ``certified`` that
-took 1.5 times the time it was given.
+under the mission's own. A fault is a plan that the referee refuses, a bound below a plan, a bound
+that does not follow from its own proof, a plan better than that of ``certified`` by more than half
+a percent, or an answer of ``certified`` that took 1.5 times the time it was given.
 
     python -m benchmarks.sweep --first 1 --last 40 --cpu-s 10 build/sweep.csv
 """
@@ -21,6 +21,8 @@ from typing import Final
 from benchmarks.cpu_budget import CpuBudget
 from benchmarks.missions import problem_of
 from benchmarks.sweep.missions import random_mission
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.domain import Objective, Scenario
 from planner_core.errors import PlannerError
 from planner_core.problem import Problem
@@ -46,11 +48,14 @@ class Answer:
     ----------
     bound
         None if nothing is proven, or only for another objective.
+    is_proven
+        Whether the bound follows from the proof, read as it is stored.
     """
 
     way: str
     reward: float
     bound: float | None
+    is_proven: bool
     is_valid: bool
     used_s: float
 
@@ -109,9 +114,16 @@ def _answer(way: str, solver: Solver, asked: Problem, problem: Problem, cpu_s: f
         way=way,
         reward=timeline.reward,
         bound=solution.bound if asked is problem else None,
+        is_proven=solution.proven is None or follows_from_proof(asked, solution.proven),
         is_valid=timeline.is_valid,
         used_s=used_s,
     )
+
+
+def follows_from_proof(problem: Problem, bound: Bound) -> bool:
+    """Return whether a bound can be checked from its JSON text; a report of HiGHS is believed."""
+    is_checked = is_proven(problem, from_json(to_json(bound)))
+    return bound.proof == "milp" if is_checked is None else is_checked
 
 
 def fault_of(answer: Answer, answers: list[Answer], cpu_s: float) -> str:
@@ -122,6 +134,8 @@ def fault_of(answer: Answer, answers: list[Answer], cpu_s: float) -> str:
         return "invalid"
     if answer.bound is not None and answer.bound < best * (1.0 - _ROUNDING):
         return f"bound below {best:.3f}"
+    if not answer.is_proven:
+        return "not proven"
     if answer.way == "certified" and answer.reward < best * (1.0 - _BETTER):
         return f"worse than {best:.3f}"
     if answer.way == "certified" and answer.used_s > _OVER * cpu_s:

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from planner_core.budget import Budget
 from planner_core.certified.driver import Effort
-from planner_core.certified.mip.model import Formulation
+from planner_core.certified.program.model import Formulation
 from planner_core.certified.strategies.every import solved
 from planner_core.certified.strategies.supports import is_agility_only
 from planner_core.certified.strategies.whole_program import WholeProgram

@@ -24,11 +24,25 @@ class RefutationOut(Wire):
     )
 
 
+class RowMultipliersOut(Wire):
+    """Multipliers of rows of the whole program as a linear program, and of clique cuts."""
+
+    rows: tuple[int, ...] = Field(description="Rows of the program; all others have 0.")
+    prices: tuple[float, ...] = Field(
+        description="A multiplier for each of these rows: that of its upper limit if above 0, that "
+        "of its lower limit if below 0."
+    )
+    cliques: tuple[tuple[int, ...], ...] = Field(
+        description="Opportunities of one satellite that exclude each other pairwise."
+    )
+    clique_prices: tuple[float, ...]
+
+
 class ProofOut(Wire):
     """The proof of a bound, which planner_core checks without any search."""
 
     version: int
-    proof: str = Field(description="The argument: `milp`, `lagrangian`, `dp` or `totals`.")
+    proof: str = Field(description="`milp`, `lagrangian`, `dp`, `linear` or `totals`.")
     value: float = Field(description="The bound.")
     prices: tuple[float, ...] | None = Field(
         None, description="A multiplier for each target, in the order of the scenario."
@@ -59,6 +73,12 @@ class ProofOut(Wire):
     unit: float | None = Field(
         None,
         description="With battery and recorder: the unit in which worth is counted, rounded up.",
+    )
+    cell_s: float | None = Field(
+        None, description="With continuous starts: the width of the cells of start times."
+    )
+    row_prices: RowMultipliersOut | None = Field(
+        None, description="If the linear relaxation of the whole program proves the bound."
     )
     amount: float | None = Field(None, description="The reward that `refutation` rules out.")
     refutation: RefutationOut | None = None

@@ -105,7 +105,7 @@ class TotalsOut(ImageFiguresOut):
     bound: float | None = Field(description="Proven: no plan of the scenario can earn more.")
     gap: float | None = Field(description="`(bound - reward) / bound`.")
     bound_proof: str | None = Field(
-        description="`milp`, `lagrangian`, `dp` or `totals`; more may be added."
+        description="`milp`, `lagrangian`, `dp`, `linear` or `totals`; more may be added."
     )
     collects: int
     contacts: int

@@ -7,11 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.sweep.__main__ import Answer, answers_of, fault_of
+from benchmarks.missions import problem_of
+from benchmarks.sweep.__main__ import Answer, answers_of, fault_of, follows_from_proof
 from benchmarks.sweep.missions import random_mission
+from planner_core.certified.proofs.bound import Bound, accessible
 
-RIGHT = Answer(way="certified", reward=100.0, bound=101.0, is_valid=True, used_s=9.0)
-OTHER = Answer(way="rule", reward=99.0, bound=None, is_valid=True, used_s=0.1)
+RIGHT = Answer(
+    way="certified", reward=100.0, bound=101.0, is_proven=True, is_valid=True, used_s=9.0
+)
+OTHER = replace(RIGHT, way="rule", reward=99.0, bound=None, used_s=0.1)
 _SMALL = 17
 """A mission of 60 targets."""
 
@@ -39,12 +43,21 @@ def test_a_small_mission_is_planned_in_every_way_without_a_fault() -> None:
         (replace(RIGHT, reward=95.0), "worse than 99.000"),
         (replace(RIGHT, reward=98.8), ""),
         (replace(RIGHT, bound=98.0), "bound below 100.000"),
+        (replace(RIGHT, is_proven=False), "not proven"),
         (replace(RIGHT, used_s=16.0), "too long"),
         (OTHER, ""),
     ],
 )
 def test_what_is_wrong_with_an_answer_is_named(answer: Answer, fault: str) -> None:
     assert fault_of(answer, [answer, OTHER], 10.0) == fault
+
+
+def test_only_a_report_of_highs_is_believed() -> None:
+    problem = problem_of(random_mission(_SMALL))
+    assert follows_from_proof(problem, accessible(problem))
+    assert not follows_from_proof(problem, replace(accessible(problem), value=0.1))
+    assert follows_from_proof(problem, Bound(value=0.1, proof="milp", log="HiGHS"))
+    assert not follows_from_proof(problem, Bound(value=0.1, proof="lagrangian"))
 
 
 def test_a_plan_that_is_not_valid_makes_no_other_worse() -> None:

@@ -19,7 +19,7 @@ from planner_core.certified.lns.insertion_with_resources import (
     replanned_window,
 )
 from planner_core.certified.proofs import documents as proofs
-from planner_core.certified.proofs.bound import accessible
+from planner_core.certified.proofs.bound import Bound, accessible
 from planner_core.certified.proofs.continuous import ContinuousDual, continuous_value
 from planner_core.certified.strategies import continuous
 from planner_core.certified.strategies.continuous import with_own_starts
@@ -32,7 +32,6 @@ from planner_core.problem import (
     COLLECT,
     CONTACT,
     Blocked,
-    Floats,
     Kept,
     Pinned,
     Problem,
@@ -169,9 +168,10 @@ def test_multipliers_that_prove_nothing_better_let_others_have_their_turn(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem = flat_problem(1, num_targets=8)
-    told = [None, (100.0, problem.best_worth), None, None, (100.0, problem.best_worth)]
+    high = replace(accessible(problem), value=100.0)
+    told = [None, high, None, None, high]
 
-    def ascend(*_: object) -> Iterator[tuple[float, Floats] | None]:
+    def ascend(*_: object) -> Iterator[Bound | None]:
         yield from told
 
     monkeypatch.setattr(continuous, "ascend_on_chains", ascend)
@@ -293,7 +293,7 @@ def test_a_satellite_slower_than_its_lines_of_sight_has_the_bound_of_all_targets
     assert solution.bound == accessible(slow).value
     assert solution.proven is not None
     assert proofs.is_proven(slow, solution.proven)
-    assert continuous_value(slow, np.zeros(10)) == accessible(slow).value
+    assert continuous_value(slow, np.zeros(10), None) == accessible(slow).value
 
 
 @examples(30)

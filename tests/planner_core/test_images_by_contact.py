@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
-from planner_core.certified.mip import deliveries
 from planner_core.certified.mip.highs import Engine
-from planner_core.certified.mip.model import plan_program
 from planner_core.certified.mip.program_windows import ProgramWindows
+from planner_core.certified.program import deliveries
+from planner_core.certified.program.model import plan_program
 from planner_core.certified.tolerances import TOUCHING
 from planner_core.domain import Objective
 from planner_core.problem import Problem

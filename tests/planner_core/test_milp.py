@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from planner_core.budget import Budget, Progress, Termination
 from planner_core.certified.mip.highs import Engine, Outcome
-from planner_core.certified.mip.model import plan_program
-from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.whole_relaxation import whole_relaxation
+from planner_core.certified.program.linear_program import Program, Rows
+from planner_core.certified.program.model import plan_program
 from planner_core.certified.proofs.documents import is_proven
 from planner_core.certified.strategies import whole_program
 from planner_core.certified.strategies.whole_program import WholeProgram

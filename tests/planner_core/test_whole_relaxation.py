@@ -14,7 +14,16 @@ from planner_core.budget import Budget
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.contact_exchange import ContactExchange
-from planner_core.certified.mip.whole_relaxation import charges_for_data_left, whole_relaxation
+from planner_core.certified.mip.whole_relaxation import whole_relaxation
+from planner_core.certified.program.linear_program import Program, Rows
+from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
+from planner_core.certified.proofs.whole_program import (
+    RowMultipliers,
+    charges_for_data_left,
+    program_to_relax,
+    whole_program_value,
+)
 from planner_core.certified.strategies.every import STRATEGIES
 from planner_core.certified.strategies.relaxed import Relaxed
 from planner_core.certified.strategies.resource_fleet import FleetAscent
@@ -89,7 +98,58 @@ def test_no_plan_beats_the_relaxation(
     with suppress(InvalidScenario):
         problem = _keeping(problem, *rows.tolist())
     assume(replay(problem, Plan().with_kept(problem)).is_valid)
-    assert whole_relaxation(problem, Budget(), 0).bound.value >= best_reward(problem) - 1e-6
+    bound = whole_relaxation(problem, Budget(), 0).bound
+    assert bound.value >= best_reward(problem) - 1e-6
+    assert_checkable(problem, bound)
+
+
+def assert_checkable(problem: Problem, bound: Bound) -> None:
+    read = from_json(to_json(bound))
+    assert is_proven(problem, read)
+    too_low = 0.999 * bound.value - problem.reward_unit - 1e-6
+    assert not is_proven(problem, replace(read, value=too_low))
+
+
+@examples(200)
+@given(seed=SEEDS, scale=st.sampled_from([0.01, 1.0, 100.0]))
+def test_no_plan_beats_any_multipliers_of_rows(seed: int, scale: float) -> None:
+    problem = varied_problem(seed, "paper", 2, scarce=TIGHT, num_contacts=4)
+    problem = with_objective(problem, _HALF)
+    model, rng = program_to_relax(problem), np.random.default_rng(seed)
+    drawn = rng.normal(scale=scale, size=model.program.num_rows)
+    found = whole_relaxation(problem, Budget(), 0).bound.row_multipliers
+    assert found is not None
+    near = replace(found, of_rows=found.of_rows * rng.uniform(1.0 - scale, 1.0 + scale))
+    every = np.arange(model.program.num_rows, dtype=np.int32)
+    for multipliers in (RowMultipliers(rows=every, of_rows=drawn), near):
+        assert whole_program_value(model, multipliers) >= best_reward(problem) - 1e-9
+
+
+def test_columns_without_limit_forgive_rounding_errors() -> None:
+    """At most 1 of x and 0.4 for each y above 0.5: y >= x - 0.5 costs less than x is worth."""
+    program = Program()
+    x = program.add_columns(np.ones(1))
+    y = program.add_columns(np.array([-0.4]), upper=np.inf)
+    program.add_rows(Rows.aligned((y, 1.0), (x, -1.0), lower=-0.5))
+    assert program.dual_value(np.array([-0.4])) == pytest.approx(0.8)
+    assert program.dual_value(np.array([-0.4 - 1e-16])) == pytest.approx(0.8)
+    assert program.dual_value(np.array([-0.8])) == pytest.approx(0.8, abs=1e-6)
+    assert program.dual_value(np.array([0.3])) == 1.0, "there is no upper limit to pay for"
+
+
+def test_sets_that_are_no_cliques_prove_nothing() -> None:
+    problem = _two_images_and_a_contact_for_one()
+    model = program_to_relax(problem)
+
+    def value(clique: list[int], multiplier: float) -> float:
+        none = RowMultipliers(rows=np.empty(0, np.int32), of_rows=np.empty(0))
+        cliques, of_cliques = (np.array(clique, dtype=np.int32),), (multiplier,)
+        return whole_program_value(model, replace(none, cliques=cliques, of_cliques=of_cliques))
+
+    assert value([0], 0.5) == 2.0
+    assert value([0, 1], 0.5) == np.inf, "both fit into a plan"
+    assert value([0, 0], 0.5) == np.inf, "it would count twice"
+    assert value([0], -0.5) == np.inf
 
 
 @examples(200)
@@ -100,7 +160,9 @@ def test_no_plan_with_turns_to_the_sun_beats_it(
     problem = sunny_problem(seed, num_satellites=num_satellites, num_collects=6)
     problem = with_objective(problem, Objective(collected_share=collected_share))
     if replay(problem, Plan()).is_valid:
-        assert whole_relaxation(problem, Budget(), 0).bound.value >= best_reward(problem) - 1e-6
+        bound = whole_relaxation(problem, Budget(), 0).bound
+        assert bound.value >= best_reward(problem) - 1e-6
+        assert_checkable(problem, bound)
 
 
 def _keeping(problem: Problem, *rows: int) -> Problem:
@@ -138,17 +200,17 @@ def test_images_that_may_earn_nothing_are_not_charged_for() -> None:
     assert not charges_for_data_left(with_objective(detours, _HALF))
 
 
-def test_a_budget_that_is_over_proves_nothing() -> None:
+def test_a_budget_that_is_over_proves_next_to_nothing() -> None:
     spent = Budget()
     spent.cancel()
     problem = _two_images_and_a_contact_for_one()
     relaxation = whole_relaxation(problem, spent, 0)
-    assert relaxation.bound.value == np.inf
+    assert relaxation.bound.value == 2.0, "what all images earn"
     assert sorted(relaxation.order) == [0, 1, 2]
     relaxed = Relaxed(Incumbent(problem, spent, 0.0), 0)
     relaxed.solve()
     assert relaxed.is_known
-    assert not relaxed.proves_more_than(1e9)
+    assert not relaxed.proves_more_than(2.0)
 
 
 def _one_pass_for_two_satellites() -> Problem:

@@ -19,6 +19,7 @@ from planner_core import domain, pins
 from planner_core.budget import Budget
 from planner_core.certified.proofs import documents
 from planner_core.certified.proofs.bound import Bound
+from planner_core.certified.proofs.whole_program import RowMultipliers
 from planner_core.reasons import reason
 from planner_core.solvers.base import Constraint
 from planner_core.solvers.registry import solver_class
@@ -201,6 +202,13 @@ def test_every_part_of_a_proof_is_declared() -> None:
         queue_levels=12,
         is_elementary=True,
         unit=0.5,
+        cell_s=20.0,
+        row_multipliers=RowMultipliers(
+            rows=np.array([0, 7], dtype=np.int32),
+            of_rows=np.array([0.5, -1.0]),
+            cliques=(np.array([3, 4], dtype=np.int32),),
+            of_cliques=(0.25,),
+        ),
         log="HiGHS",
         on_board=1.0,
     )

@@ -15,7 +15,7 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.highs import Engine
-from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.proofs.satellite_relaxation import SatelliteRelaxation
 from planner_core.precedence.antennas import antenna_groups, at_the_same_time
 from planner_core.problem import COLLECT, Bools, Floats, Ints, Problem

@@ -15,10 +15,10 @@ import highspy
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.mip.clique_cuts import violated_cliques
 from planner_core.certified.mip.highs import Engine
-from planner_core.certified.mip.model import plan_program
-from planner_core.certified.mip.program import Rows
+from planner_core.certified.program.clique_cuts import violated_cliques
+from planner_core.certified.program.linear_program import Rows
+from planner_core.certified.program.model import plan_program
 from planner_core.certified.tolerances import CHAINED, INSIDE
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import (

@@ -10,7 +10,7 @@ import highspy
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.sizes import LARGE_PROGRAM, LOG_CHARACTERS, PAUSE_S, POLL_S
 from planner_core.certified.tolerances import CHAINED, NEARLY, NOTHING, SAME
 from planner_core.problem import Floats, Ints
@@ -57,6 +57,8 @@ class Engine:
     columns, gains
         The last corner of the relaxation, and what it would gain per unit more of each column
         (below 0 if that would lose); 0 as long as none was found. Shape ``(num_columns,)``.
+    row_multipliers
+        Those of the rows at that corner, as ``Program.dual_value`` takes them.
     """
 
     def __init__(self, program: Program, budget: Budget, seed: int, *, is_chained: bool) -> None:
@@ -65,6 +67,7 @@ class Engine:
         self._bound = float("inf")
         self._incumbent: Floats | None = None
         self.columns, self.gains = np.zeros((2, program.num_columns))
+        self.row_multipliers = np.zeros(program.num_rows)
         self._is_abandoned = False
         self._messages: list[str] = []
         self._highs = highs = highspy.Highs()  # type: ignore[no-untyped-call]  # it has no types
@@ -125,6 +128,7 @@ class Engine:
         self._bound = min(self._bound, float(info.objective_function_value) + doubt)
         solution = self._highs.getSolution()
         self.columns, self.gains = np.array(solution.col_value), np.array(solution.col_dual)
+        self.row_multipliers = np.array(solution.row_dual)
         return self.columns
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.highs import Engine
-from planner_core.certified.mip.model import plan_program
+from planner_core.certified.program.model import plan_program
 from planner_core.certified.tolerances import INSIDE
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Bools, Problem

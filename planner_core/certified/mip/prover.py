@@ -6,7 +6,7 @@ import numpy as np
 
 from planner_core.budget import Budget
 from planner_core.certified.mip.highs import Engine, Watch
-from planner_core.certified.mip.program import Program
+from planner_core.certified.program.linear_program import Program
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.mip.clique_cuts import clique_cover, violated_cliques
 from planner_core.certified.mip.highs import Engine
-from planner_core.certified.mip.program import Program, Rows
 from planner_core.certified.mip.zero_half_cuts import Sets, deepest, zero_half_cuts
+from planner_core.certified.program.clique_cuts import clique_cover, violated_cliques
+from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.proofs.certificate import Cut, Multipliers
 from planner_core.certified.tuning import TUNING
 from planner_core.draws import draws_of

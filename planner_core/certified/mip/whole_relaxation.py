@@ -7,16 +7,18 @@ from typing import NamedTuple
 import numpy as np
 
 from planner_core.budget import Budget
-from planner_core.certified.dp.resource_network import left_cost
-from planner_core.certified.mip.clique_cuts import violated_cliques
 from planner_core.certified.mip.highs import Engine, Watch
-from planner_core.certified.mip.model import OnBoard, PlanProgram, plan_program
-from planner_core.certified.mip.program import Rows
+from planner_core.certified.program.clique_cuts import violated_cliques
+from planner_core.certified.program.linear_program import Rows
+from planner_core.certified.program.model import PlanProgram
 from planner_core.certified.proofs.bound import Bound
-from planner_core.certified.tolerances import TOUCHING
+from planner_core.certified.proofs.whole_program import (
+    RowMultipliers,
+    program_to_relax,
+    whole_program_value,
+)
 from planner_core.certified.tuning import TUNING
-from planner_core.precedence.relation import is_transitive
-from planner_core.problem import COLLECT, Longs, Problem
+from planner_core.problem import Floats, Ints, Longs, Problem
 
 
 class WholeRelaxation(NamedTuple):
@@ -36,57 +38,54 @@ class WholeRelaxation(NamedTuple):
 
 
 def whole_relaxation(problem: Problem, budget: Budget, seed: int) -> WholeRelaxation:
-    """Return the linear relaxation of the whole program, with clique cuts.
-
-    If images on board lose a part of their worth, all data left there has one cost. Columns for
-    images that come down would take three times as long and lower less: fractions of images do.
-    """
-    on_board: OnBoard = "at a cost" if charges_for_data_left(problem) else "worth the same"
-    model = plan_program(problem, "antichain", TOUCHING, on_board=on_board)
+    """Return the linear relaxation of the whole program, with clique cuts."""
+    model = program_to_relax(problem)
     engine = Engine(model.program, budget, seed, is_chained=problem.use_resources)
-    cut_by_cliques(engine, model, TUNING.patience, _unwatched)
+    cliques = cut_by_cliques(engine, model, TUNING.patience, _unwatched)
     n = len(problem.opportunities)
     return WholeRelaxation(
-        bound=Bound(value=engine.bound, proof="milp", log=engine.log),
+        bound=_bound(model, engine.row_multipliers, cliques),
         order=np.lexsort((-engine.columns[:n], np.abs(engine.gains[:n]))),
     )
 
 
-def charges_for_data_left(problem: Problem) -> bool:
-    """Whether a cost of data that stays on board bounds what its images lose.
-
-    Images that earn nothing must cost nothing, so no plan may need any: as a detour, or because it
-    is kept.
-    """
-    kept = problem.kept_rows
-    is_idle = (problem.opportunities.kind[kept] == COLLECT) & (problem.worth[kept] <= 0.0)
-    return (
-        is_transitive(problem)
-        and not is_idle.any()
-        and any(left_cost(problem, one) > 0.0 for one in problem.satellites if len(one))
+def _bound(model: PlanProgram, multipliers: Floats, cliques: list[Ints]) -> Bound:
+    """Return the bound that the row duals prove."""
+    of_rows, of_cliques = np.split(multipliers, [model.program.num_rows])
+    rows = np.flatnonzero(of_rows)
+    is_used = np.flatnonzero(of_cliques > 0.0)
+    proof = RowMultipliers(
+        rows=rows.astype(np.int32),
+        of_rows=of_rows[rows],
+        cliques=tuple(cliques[i] for i in is_used),
+        of_cliques=tuple(of_cliques[is_used].tolist()),
     )
+    value = whole_program_value(model, proof)
+    return Bound(value=value, proof="linear", row_multipliers=proof)
 
 
-def cut_by_cliques(engine: Engine, model: PlanProgram, rounds: int, watch: Watch) -> None:
-    """Add violated clique cuts while they lower the bound noticeably."""
+def cut_by_cliques(engine: Engine, model: PlanProgram, rounds: int, watch: Watch) -> list[Ints]:
+    """Add violated clique cuts while they lower the bound noticeably; return the cliques."""
     bounds: list[float] = []
+    cliques: list[Ints] = []
     for _ in range(rounds):
         taken = engine.relaxed()
         if taken is None:
-            return
+            break
         watch(-np.inf, engine.bound)
         bounds.append(engine.bound)
         trifle = TUNING.little**2 * bounds[-1]
         if len(bounds) > TUNING.several and bounds[-1 - TUNING.several] - bounds[-1] < trifle:
-            return
-        num_added = 0
+            break
+        known = len(cliques)
         for satellite, precedence in zip(model.problem.satellites, model.precedences, strict=True):
             own = model.taken[satellite.rows]
             offsets, members = violated_cliques(precedence, taken[own])
             engine.add_rows(Rows.of(offsets, own[members], upper=1.0))
-            num_added += len(offsets) - 1
-        if num_added == 0:
-            return
+            cliques += np.split(satellite.rows[members], offsets[1:-1])[: len(offsets) - 1]
+        if len(cliques) == known:
+            break
+    return cliques
 
 
 def _unwatched(_reward: float, _bound: float) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner_core.certified.multipliers.ascent import Ascent, Latest, OneByOne, Steps
+from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.continuous import (
     ContinuousDual,
     num_followers,
@@ -38,8 +39,8 @@ class Chains(OneByOne):
         return value - float(multipliers.sum())
 
 
-def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Floats] | None]:
-    """Yield a stage's best bound and its multipliers, or None after an epoch that proves none."""
+def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[Bound | None]:
+    """Yield a stage's best bound, or None after an epoch that proves none."""
     width_s = width_for(problem)
     if num_followers(problem, width_s) > MAX_FOLLOWERS:
         return
@@ -68,11 +69,17 @@ def ascend_on_chains(problem: Problem, stop: Bytes) -> Iterator[tuple[float, Flo
         ascent = Ascent(Chains(dual), most, begin, steps, 0)
         if steps is narrow:
             ascent.ask()
-            yield ascent.value, ascent.multipliers
+            yield _bound(ascent, cell_s)
         for epoch in range(1, steps.num_epochs + 1):
             ascent.improve(1, stop)
             if stop[0]:
                 return
-            yield None if epoch % steps.asked_every else (ascent.value, ascent.multipliers)
+            yield None if epoch % steps.asked_every else _bound(ascent, cell_s)
         begin = ascent.mean
         del dual, ascent
+
+
+def _bound(ascent: Ascent, cell_s: float) -> Bound:
+    return Bound(
+        value=ascent.value, proof="lagrangian", multipliers=ascent.multipliers, cell_s=cell_s
+    )

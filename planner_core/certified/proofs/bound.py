@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 
 from planner_core.certified.proofs.certificate import Certificate
+from planner_core.certified.proofs.whole_program import RowMultipliers
 from planner_core.certified.tolerances import LEAST_BOUND, SAME
 from planner_core.problem import Floats, Problem
 
-Proof = Literal["lagrangian", "milp", "dp", "totals"]
+Proof = Literal["lagrangian", "dp", "linear", "milp", "totals"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,6 +40,11 @@ class Bound:
         Rows of the contacts whose energy these programmes do not round.
     unit
         Unit in which the dynamic programmes count worth.
+    cell_s
+        Width of the cells of start times, if multipliers prove a bound with continuous starts.
+    row_multipliers
+        Multipliers of all rows of the whole program, if they prove the bound
+        (``whole_program.whole_program_value``).
     certificate
         Proof of a Lagrangian bound that needs cuts (``is_refuted`` checks it).
     log
@@ -57,6 +63,8 @@ class Bound:
     exact_contacts: tuple[int, ...] = ()
     is_elementary: bool = False
     unit: float | None = None
+    cell_s: float | None = None
+    row_multipliers: RowMultipliers | None = None
     certificate: Certificate | None = None
     log: str | None = None
     on_board: float = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any, Final, cast
 
 import numpy as np
@@ -27,6 +28,11 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.proofs.totals import totals_bound
+from planner_core.certified.proofs.whole_program import (
+    RowMultipliers,
+    program_to_relax,
+    whole_program_value,
+)
 from planner_core.certified.tolerances import WRITTEN
 from planner_core.problem import Floats, Problem
 from planner_core.problem.on_board import most_on_board
@@ -50,6 +56,10 @@ def to_json(bound: Bound) -> str:
         document["elementary"] = True
     if bound.unit is not None:
         document["unit"] = bound.unit
+    if bound.cell_s is not None:
+        document["cell_s"] = bound.cell_s
+    if bound.row_multipliers is not None:
+        document["row_prices"] = _row_multipliers_to_json(bound.row_multipliers)
     if bound.certificate is not None:
         document["amount"] = bound.certificate.amount
         document["refutation"] = _refutation_to_json(bound.certificate.refutation)
@@ -78,6 +88,10 @@ def from_json(text: str) -> Bound:
         exact_contacts=tuple(document.get("exact_contacts", ())),
         is_elementary=bool(document.get("elementary", False)),
         unit=document.get("unit"),
+        cell_s=document.get("cell_s"),
+        row_multipliers=_row_multipliers_from_json(document["row_prices"])
+        if "row_prices" in document
+        else None,
         certificate=Certificate(
             amount=float(document["amount"]),
             refutation=_refutation_from_json(document["refutation"]),
@@ -99,20 +113,34 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
     if bound.on_board < most_on_board(problem) - room:
         return False
     bound = bound.without_on_board()
-    if problem.continuous_starts and bound.certificate is not None:
-        # It removes tasks at the opportunities' starts only; other starts remain possible.
-        return False
+    # What agility alone allows may be a multiple of a larger unit than what plans earn.
+    alone = replace(problem, use_resources=False)
     if bound.certificate is not None:
-        is_enough = bound.certificate.amount <= bound.value + (reward_unit(problem) or room)
-        return is_enough and is_refuted(problem, bound.certificate)
+        is_enough = bound.certificate.amount <= bound.value + (reward_unit(alone) or room)
+        # It removes tasks at the opportunities' starts only; other starts remain possible.
+        is_meant = not problem.continuous_starts
+        return is_meant and is_enough and is_refuted(problem, bound.certificate)
+    value = _value(problem, bound)
+    if value is None:
+        return None
+    meant = alone if bound.proof == "lagrangian" else problem
+    return rounded_bound(meant, value, 0.0) <= bound.value + room
+
+
+def _value(problem: Problem, bound: Bound) -> float | None:
+    """Return what multipliers or totals prove, infinite if nothing; None if there are none."""
     if bound.proof == "totals":
         totals = totals_bound(problem)
-        return totals is not None and totals.value <= bound.value + room
+        return np.inf if totals is None else totals.value
+    if bound.row_multipliers is not None:
+        if problem.continuous_starts:  # the program has the opportunities' starts alone
+            return np.inf
+        return whole_program_value(program_to_relax(problem), bound.row_multipliers)
     if bound.multipliers is None:
         return None
     if problem.continuous_starts:
-        value = continuous_value(problem, bound.multipliers)
-    elif bound.queue_levels is not None:
+        return continuous_value(problem, bound.multipliers, bound.cell_s)
+    if bound.queue_levels is not None:
         value, _ = queue_value(
             problem,
             bound.multipliers,
@@ -131,7 +159,25 @@ def is_proven(problem: Problem, bound: Bound) -> bool | None:
         value, _ = elementary_value(problem, bound.multipliers)
     else:
         value, _ = lagrangian_value(problem, bound.multipliers)
-    return rounded_bound(problem, value, 0.0) <= bound.value + room
+    return value
+
+
+def _row_multipliers_to_json(multipliers: RowMultipliers) -> dict[str, Any]:
+    return {
+        "rows": multipliers.rows.tolist(),
+        "prices": multipliers.of_rows.tolist(),
+        "cliques": [clique.tolist() for clique in multipliers.cliques],
+        "clique_prices": list(multipliers.of_cliques),
+    }
+
+
+def _row_multipliers_from_json(document: dict[str, Any]) -> RowMultipliers:
+    return RowMultipliers(
+        rows=np.array(document["rows"], dtype=np.int32),
+        of_rows=np.array(document["prices"], dtype=np.float64),
+        cliques=tuple(np.array(clique, dtype=np.int32) for clique in document["cliques"]),
+        of_cliques=tuple(document["clique_prices"]),
+    )
 
 
 def _refutation_to_json(refutation: Refutation) -> dict[str, Any]:

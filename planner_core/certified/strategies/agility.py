@@ -15,13 +15,13 @@ import numpy as np
 from planner_core.certified.driver import Effort, Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.search import WindowSearch
-from planner_core.certified.mip.model import plan_program
-from planner_core.certified.mip.program import Program
 from planner_core.certified.mip.prover import Prover
 from planner_core.certified.mip.restricted_master import Master
 from planner_core.certified.multipliers.ascent import Ascent
 from planner_core.certified.multipliers.elementary import ascent_on_passes
 from planner_core.certified.multipliers.paths import ascent_on_paths
+from planner_core.certified.program.linear_program import Program
+from planner_core.certified.program.model import plan_program
 from planner_core.certified.proofs.bound import Bound, accessible, is_optimal, rounded_bound
 from planner_core.certified.proofs.certificate import (
     Certificate,

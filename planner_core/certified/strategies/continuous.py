@@ -16,7 +16,6 @@ from planner_core.certified.lns.insertion_with_resources import (
     replanned_window,
 )
 from planner_core.certified.multipliers.chains import ascend_on_chains
-from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
@@ -63,8 +62,7 @@ def chain_multipliers(search: Search) -> Iterator[None]:
     best = search.best
     for proven in ascend_on_chains(search.problem, search.budget.stop):
         if proven is not None:
-            value, multipliers = proven
-            best.lower(Bound(value=value, proof="lagrangian", multipliers=multipliers))
+            best.lower(proven)
             best.report("multipliers")
         if proven is not None or best.is_done:
             yield

@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from planner_core.certified.incumbent import Incumbent
-from planner_core.certified.mip.whole_relaxation import (
-    WholeRelaxation,
-    charges_for_data_left,
-    whole_relaxation,
-)
+from planner_core.certified.mip.whole_relaxation import WholeRelaxation, whole_relaxation
+from planner_core.certified.proofs.whole_program import charges_for_data_left
 from planner_core.certified.sizes import MAX_PAIRS
 from planner_core.certified.strategies.supports import fits_a_program, is_shared
 from planner_core.certified.tuning import TUNING

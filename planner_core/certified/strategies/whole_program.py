@@ -17,14 +17,14 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.lns.downlinks import brought_down
 from planner_core.certified.lns.search import improved
 from planner_core.certified.mip.highs import Engine, Outcome
-from planner_core.certified.mip.model import (
+from planner_core.certified.mip.whole_relaxation import cut_by_cliques
+from planner_core.certified.program.model import (
     Formulation,
     OnBoard,
     PlanProgram,
     binding_losses,
     plan_program,
 )
-from planner_core.certified.mip.whole_relaxation import cut_by_cliques
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.sizes import MAX_PAIRS, PAUSE_S
 from planner_core.certified.tolerances import INSIDE, TOUCHING

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.certified.tolerances import UNLIKE
+from planner_core.certified.tolerances import ROUNDING, UNLIKE
 from planner_core.problem import Bools, Floats, Ints
 
 
@@ -128,10 +128,46 @@ class Program:
         self.num_columns += n
         return np.arange(self.num_columns - n, self.num_columns, dtype=np.int32)
 
+    @property
+    def num_rows(self) -> int:
+        """How many constraints there are."""
+        return sum(map(len, self.rows))
+
     def tell_apart(self) -> None:
         """Raise each worth by a tiny amount of its own: bounds hold, and sums are no multiples."""
         worth = np.concatenate(self.worth)
         self.worth = [worth * (1.0 + UNLIKE * np.random.default_rng(0).random(len(worth)))]
+
+    def dual_value(self, multipliers: Floats) -> float:
+        """Return what no point is worth more than, by Lagrangian multipliers of all rows.
+
+        One above 0 is that of its row's upper limit, one below 0 that of the lower limit. If there
+        is no such limit, it counts as 0. Any multipliers give a bound (weak duality).
+
+        Parameters
+        ----------
+        multipliers
+            One for each row, in the order in which rows were added.
+        """
+        worth, lower, upper = map(np.concatenate, (self.worth, self.lower, self.upper))
+        paid, total, at = np.zeros(len(worth)), 0.0, 0
+        for rows in self.rows:
+            own = multipliers[at : at + len(rows)]
+            at += len(rows)
+            limit = np.where(own > 0.0, rows.upper, rows.lower)
+            own, limit = np.where(np.isfinite(limit), (own, limit), 0.0)
+            total += float(own @ limit)
+            num_entries = np.diff(np.append(rows.first, len(rows.column)))
+            entries = np.repeat(own, num_entries) * rows.value
+            paid += np.bincount(rows.column, weights=entries, minlength=len(paid))
+        left = worth - paid
+        is_endless = ~np.isfinite(np.where(left > 0.0, upper, lower)) & (left != 0.0)
+        if is_endless.any():
+            # Multipliers that pay a little less, as rounding errors do, are as good.
+            share = (1.0 - ROUNDING) * min(1.0, float((worth[is_endless] / paid[is_endless]).min()))
+            left, total = worth - share * paid, share * total
+        is_used = left != 0.0
+        return total + float((left * np.where(left > 0.0, upper, lower))[is_used].sum())
 
     def add_rows(self, rows: Rows) -> None:
         """Add constraints, if there are any."""

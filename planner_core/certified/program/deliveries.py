@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.mip.program import Program, Rows
+from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.sizes import NEXT_CONTACTS
 from planner_core.certified.tolerances import DOWN
 from planner_core.problem import (

@@ -23,8 +23,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planner_core.certified.mip.program import Program, Rows
-from planner_core.certified.mip.resource_terms import ResourceTerms
+from planner_core.certified.program.linear_program import Program, Rows
+from planner_core.certified.program.resource_terms import ResourceTerms
 from planner_core.certified.tolerances import ON_BOARD
 from planner_core.problem import COLLECT, Floats, Ints, SatelliteProblem
 

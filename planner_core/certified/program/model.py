@@ -9,11 +9,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from planner_core.certified.dp.resource_network import must_deliver, worth_before_left
-from planner_core.certified.mip.clique_cuts import clique_cover, detours, excluding_pairs
-from planner_core.certified.mip.deliveries import add_deliveries
-from planner_core.certified.mip.program import Program, Rows
-from planner_core.certified.mip.resource_terms import ResourceTerms, resource_terms
-from planner_core.certified.mip.resources import add_resources
+from planner_core.certified.program.clique_cuts import clique_cover, detours, excluding_pairs
+from planner_core.certified.program.deliveries import add_deliveries
+from planner_core.certified.program.linear_program import Program, Rows
+from planner_core.certified.program.resource_terms import ResourceTerms, resource_terms
+from planner_core.certified.program.resources import add_resources
 from planner_core.certified.tolerances import SAME
 from planner_core.precedence.antennas import antenna_groups
 from planner_core.precedence.relation import (

@@ -1,0 +1,1 @@
+"""The planning model as a linear program with integer variables, without any solver."""
