@@ -22,7 +22,7 @@ from planner_core.certified.proofs.certificate import (
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.tolerances import SAME
 from planner_core.domain import Agility
-from planner_core.problem import COLLECT, Problem
+from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.referee.replay import replay
 from planner_core.solvers.base import Solution
 from planner_core.solvers.registry import Certified, Rule
@@ -281,6 +281,21 @@ def test_cuts_of_an_even_number_of_sets_or_of_one_task_twice_prove_nothing(
     assert not _refutes(1.5, Multipliers(of_targets=np.zeros(2), cuts=(cut,), of_cuts=(0.0,)))
     sound = Cut(sets=(np.array([0, 1]),))
     assert _refutes(1.5, Multipliers(of_targets=np.zeros(2), cuts=(sound,), of_cuts=(0.5,)))
+
+
+def test_a_contact_excludes_what_it_overlaps() -> None:
+    """Contacts were no part of cuts to the check, though cliques of fleets' programs hold some."""
+    tasks = [Task(kind=COLLECT, site=i, start_s=10.0 * i, end_s=10.0 * i + 30) for i in range(2)]
+    tasks.append(Task(kind=CONTACT, site=1, start_s=5.0, end_s=100.0))
+    tasks.append(Task(kind=CONTACT, site=1, start_s=200.0, end_s=300.0))
+    problem = make_problem(tasks, num_targets=2, num_stations=2)
+    for clique, is_sound in (([0, 1, 2], True), ([0, 1, 2, 3], False)):
+        cut = Cut(sets=(np.array(clique),))
+        step = Multipliers(of_targets=np.zeros(2), cuts=(cut,), of_cuts=(0.5,))
+        assert _refutes(1.5, step, problem=problem) == is_sound
+    same_number = Cut(sets=(np.array([1, 3]),))
+    step = Multipliers(of_targets=np.zeros(2), cuts=(same_number,), of_cuts=(0.0,))
+    assert not _refutes(5.0, step, problem=problem), "a station may be contacted twice"
 
 
 def test_a_branch_needs_both_of_its_sides() -> None:

@@ -42,8 +42,9 @@ class Cut:
     Attributes
     ----------
     sets
-        Sets of collects that exclude each other pairwise: of one target, or of one satellite and
-        not comparable in the transitive closure of its precedence. An odd number of sets.
+        Sets of tasks that exclude each other pairwise: collects of one target, or tasks of one
+        satellite that are not comparable in the transitive closure of its precedence. An odd number
+        of sets.
     """
 
     sets: tuple[Ints, ...]
@@ -144,11 +145,9 @@ class _Checked:
         )
 
     def _exclude(self, a: int, b: int) -> bool:
-        """Return whether no plan without duplicates holds both collects."""
+        """Return whether no plan without duplicates holds both tasks."""
         table, local = self._problem.opportunities, self._problem.local_row
-        if table.kind[a] != COLLECT or table.kind[b] != COLLECT:
-            return False
-        if table.site[a] == table.site[b]:
+        if table.kind[a] == table.kind[b] == COLLECT and table.site[a] == table.site[b]:
             return True
         satellite = int(table.satellite[a])
         if table.satellite[b] != satellite:
