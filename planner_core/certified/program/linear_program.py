@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from planner_core.certified.tolerances import ROUNDING, UNLIKE
+from planner_core.certified.tolerances import UNLIKE
 from planner_core.problem import Bools, Floats, Ints
 
 
@@ -142,7 +142,8 @@ class Program:
         """Return what no point is worth more than, by Lagrangian multipliers of all rows.
 
         One above 0 is that of its row's upper limit, one below 0 that of the lower limit. If there
-        is no such limit, it counts as 0. Any multipliers give a bound (weak duality).
+        is no such limit, it counts as 0. Any multipliers give a bound (weak duality), a finite one
+        if all columns have limits.
 
         Parameters
         ----------
@@ -161,11 +162,6 @@ class Program:
             entries = np.repeat(own, num_entries) * rows.value
             paid += np.bincount(rows.column, weights=entries, minlength=len(paid))
         left = worth - paid
-        is_endless = ~np.isfinite(np.where(left > 0.0, upper, lower)) & (left != 0.0)
-        if is_endless.any():
-            # Multipliers that pay a little less, as rounding errors do, are as good.
-            share = (1.0 - ROUNDING) * min(1.0, float((worth[is_endless] / paid[is_endless]).min()))
-            left, total = worth - share * paid, share * total
         is_used = left != 0.0
         return total + float((left * np.where(left > 0.0, upper, lower))[is_used].sum())
 

@@ -56,7 +56,7 @@ def add_resources(
         _add_delivery(program, satellite, terms.delivered, level, taken)
     _add_shares(program, terms, level, taken, down, margin)
     if terms.left_cost > 0.0:
-        _add_cost_of_data_left(program, satellite, terms.left_cost, level)
+        _add_cost_of_data_left(program, satellite, terms, level, margin)
 
 
 def _add_battery(
@@ -170,11 +170,12 @@ def _add_shares(
         return
     program.add_rows(Rows.aligned((down[images], 1.0), (taken[images], -1.0), upper=0.0))
     fills = np.flatnonzero((terms.data_gain > 0.0) | (down >= 0))
-    most = np.append(np.full(len(fills) - 1, np.inf), 0.0)
+    gain = terms.data_gain[fills[1:]]
+    most = np.append(np.cumsum(gain[::-1])[::-1], 0.0)
     after = program.add_columns(np.zeros(len(fills)), upper=most, is_integer=False)
-    next_one, gain = taken[fills[1:]], -terms.data_gain[fills[1:]]
+    next_one = taken[fills[1:]]
     program.add_rows(
-        Rows.aligned((after[:-1], 1.0), (after[1:], -1.0), (next_one, gain), lower=0.0, upper=0.0)
+        Rows.aligned((after[:-1], 1.0), (after[1:], -1.0), (next_one, -gain), lower=0.0, upper=0.0)
     )
     free = terms.comes_down[images] + (ON_BOARD if margin < 0.0 else -margin)
     highest = max(float(terms.recorder_top[-1]), float(free.max()))
@@ -186,9 +187,11 @@ def _add_shares(
 
 
 def _add_cost_of_data_left(
-    program: Program, satellite: SatelliteProblem, left_cost: float, level: Ints
+    program: Program, satellite: SatelliteProblem, terms: ResourceTerms, level: Ints, margin: float
 ) -> None:
     """Charge for data that the recorder holds at the end beyond what it held at the start."""
     start = max(satellite.resources.initial_recorder_fraction, 0.0)
-    left = program.add_columns(np.array([-left_cost]), lower=-start, upper=np.inf, is_integer=False)
+    most = max(0.0, float(terms.recorder_top[-1]) - margin - start)
+    cost = np.array([-terms.left_cost])
+    left = program.add_columns(cost, lower=-start, upper=most, is_integer=False)
     program.add_rows(Rows.aligned((left, 1.0), (level[-1:], -1.0), lower=-start))

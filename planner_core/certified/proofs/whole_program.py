@@ -43,8 +43,11 @@ def program_to_relax(problem: Problem) -> PlanProgram:
 
     If images on board lose a part of their worth, all data left there has one cost. Columns for
     images that come down would take three times as long and lower less: fractions of images do.
+    They are needed if what images lose depends on when they come down.
     """
     on_board: OnBoard = "at a cost" if charges_for_data_left(problem) else "worth the same"
+    if problem.counts_delivery and problem.objective.half_life_s is not None:
+        on_board = "worth less"
     return plan_program(problem, "antichain", TOUCHING, on_board=on_board)
 
 

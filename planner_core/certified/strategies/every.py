@@ -20,6 +20,7 @@ from planner_core.certified.strategies import (
     whole_program,
 )
 from planner_core.certified.strategies.supports import (
+    earns_on_board,
     fits_a_program,
     has_choice_of_starts,
     has_continuous_starts,
@@ -244,6 +245,11 @@ STRATEGIES: Final = (
         supports=is_aging_but_no_fleet,
         slices=half_life.plans_by_contacts,
         patience=lambda: TUNING.patience,
+    ),
+    Strategy(
+        name="whole relaxation with ages",
+        supports=earns_on_board,
+        slices=half_life.whole_relaxation,
     ),
     Strategy(
         name="windows by small programs",

@@ -34,7 +34,7 @@ from planner_core.certified.strategies.resources import (
     choices_from_the_best,
     windows_and_choices,
 )
-from planner_core.certified.strategies.supports import is_shared
+from planner_core.certified.strategies.supports import has_few_deliveries, is_shared
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import CONTACT, Floats, Problem
 from planner_core.problem.delivery import without_half_life
@@ -116,6 +116,23 @@ def queues(search: Search) -> Iterator[None]:
     shared.name()
     yield
     shared.prove()
+    yield
+
+
+def whole_relaxation(search: Search) -> Iterator[None]:
+    """Bound plans by the relaxation of the whole program, with ages.
+
+    If images earn a share on board, exact programmes of queues round the energy and data of many
+    more images than come down. One satellite over 1,000 targets (a share of 0.5, half-life of 3 h)
+    has a bound of 128.6 by the relaxation after two seconds, and of 134.4 by queues after ten; its
+    plan earns 126.3. A relaxation that takes longer comes after other strategies, if these leave
+    plan and bound far apart: with 4,095 opportunities it proves 130.5 instead of 169.2 after 24 s.
+    """
+    if not has_few_deliveries(search.problem):
+        yield
+        if search.best.is_within(TUNING.tight):
+            return
+    search.engine(ResourceSearch).whole.solve()
     yield
 
 

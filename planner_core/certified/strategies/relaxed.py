@@ -8,7 +8,7 @@ from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.whole_relaxation import WholeRelaxation, whole_relaxation
 from planner_core.certified.proofs.whole_program import charges_for_data_left
 from planner_core.certified.sizes import MAX_PAIRS
-from planner_core.certified.strategies.supports import fits_a_program, is_shared
+from planner_core.certified.strategies.supports import fits_a_program, has_half_life, is_shared
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import num_near_pairs
 from planner_core.problem import Bools
@@ -34,8 +34,10 @@ class Relaxed:
         worth, and make few steps on multipliers of antennas.
         """
         best, problem = self._best, self._best.problem
-        is_loose = charges_for_data_left(problem) or (
-            problem.has_better_images and not is_shared(problem)
+        is_loose = (
+            charges_for_data_left(problem)
+            or (problem.has_better_images and not is_shared(problem))
+            or has_half_life(problem)
         )
         most = TUNING.most_relaxed if is_shared(problem) else TUNING.most_columns
         is_small = len(problem.opportunities) <= most

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from planner_core.certified.sizes import NEXT_CONTACTS
 from planner_core.certified.tuning import TUNING
 from planner_core.precedence.relation import is_transitive
 from planner_core.problem import COLLECT, Problem
@@ -168,6 +169,19 @@ def is_shared_and_aging_in_programs(problem: Problem) -> bool:
     """Whether such programs apply to several satellites with few tasks."""
     is_small = len(problem.opportunities) <= TUNING.open_tasks
     return is_shared(problem) and is_small and is_aging_in_programs(problem)
+
+
+def earns_on_board(problem: Problem) -> bool:
+    """Whether images age but earn a share on board, and no whole program comes first."""
+    is_asked = is_aging(problem) and is_transitive(problem)
+    has_share = problem.objective.collected_share > 0.0
+    return is_asked and has_share and not is_shared_and_aging_in_programs(problem)
+
+
+def has_few_deliveries(problem: Problem) -> bool:
+    """Whether a relaxation with columns for the contacts after each image takes a few seconds."""
+    num_images = int(np.count_nonzero(problem.opportunities.kind == COLLECT))
+    return num_images * NEXT_CONTACTS <= TUNING.most_relaxed
 
 
 def is_within_reach(problem: Problem) -> bool:
