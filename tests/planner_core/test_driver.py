@@ -186,8 +186,8 @@ def test_engines_are_shared() -> None:
 MOVING: Final = Agility(slew_model="moving", acceleration_deg_s2=0.1)
 
 
-def _late(problem: Problem) -> Problem:
-    return with_objective(problem, Objective(collected_share=0.0, half_life_s=3000.0))
+def _late(problem: Problem, share: float = 0.0) -> Problem:
+    return with_objective(problem, Objective(collected_share=share, half_life_s=3000.0))
 
 
 KINDS: Final = {
@@ -203,6 +203,7 @@ KINDS: Final = {
     "fleet in motion": random_problem(1, num_collects=20, num_contacts=2, num_satellites=2,
                                       agility=MOVING),
     "aging": _late(random_problem(1, num_collects=20, num_contacts=2)),
+    "aging on board": _late(random_problem(2, num_collects=20, num_contacts=2), 0.5),
     "aging fleet": _late(random_problem(1, num_collects=20, num_contacts=2, num_satellites=2)),
     "continuous starts": flat_problem(1, num_targets=8),
     "continuous starts with limits": flat_problem(

@@ -73,11 +73,13 @@ _BARE = replace(
     has_quality=st.booleans(),
     agility=st.sampled_from([Agility(), _SLOW]),
     num_kept=st.integers(0, 2),
+    half_life_s=st.sampled_from([None, 300.0, 1800.0]),
 )
 def test_no_plan_beats_the_relaxation(
     seed: int,
     dynamics: Dynamics,
     collected_share: float,
+    half_life_s: float | None,
     num_satellites: int,
     has_quality: bool,
     agility: Agility,
@@ -93,7 +95,8 @@ def test_no_plan_beats_the_relaxation(
         num_collects=6,
         num_targets=4,
     )
-    problem = with_objective(problem, Objective(collected_share=collected_share))
+    objective = Objective(collected_share=collected_share, half_life_s=half_life_s)
+    problem = with_objective(problem, objective)
     rows = np.random.default_rng(seed).permutation(len(problem.opportunities))[:num_kept]
     with suppress(InvalidScenario):
         problem = _keeping(problem, *rows.tolist())
