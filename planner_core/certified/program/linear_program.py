@@ -102,11 +102,20 @@ class Rows:
 
 @dataclass(slots=True, eq=False)
 class Program:
-    """Maximise the sum of ``worth * column`` within bounds and rows."""
+    """Maximise the sum of ``worth * column`` within bounds and rows.
+
+    Attributes
+    ----------
+    most
+        The upper limits, and instead of infinite ones those that rows imply: the dual function
+        needs limits. Given to HiGHS they lead it to other corners, from which the paper's missions
+        with a share on board come within 2 % a quarter later.
+    """
 
     worth: list[Floats] = field(default_factory=list)
     lower: list[Floats] = field(default_factory=list)
     upper: list[Floats] = field(default_factory=list)
+    most: list[Floats] = field(default_factory=list)
     is_integer: list[Bools] = field(default_factory=list)
     rows: list[Rows] = field(default_factory=list)
     num_columns: int = 0
@@ -117,6 +126,7 @@ class Program:
         *,
         lower: Floats | float = 0.0,
         upper: Floats | float = 1.0,
+        most: Floats | float | None = None,
         is_integer: bool = True,
     ) -> Ints:
         """Add one column for each worth; return their numbers."""
@@ -124,6 +134,7 @@ class Program:
         self.worth.append(worth)
         self.lower.append(np.broadcast_to(np.asarray(lower, dtype=np.float64), (n,)))
         self.upper.append(np.broadcast_to(np.asarray(upper, dtype=np.float64), (n,)))
+        self.most.append(np.broadcast_to(np.asarray(upper if most is None else most), (n,)))
         self.is_integer.append(np.full(n, is_integer))
         self.num_columns += n
         return np.arange(self.num_columns - n, self.num_columns, dtype=np.int32)
@@ -142,15 +153,14 @@ class Program:
         """Return what no point is worth more than, by Lagrangian multipliers of all rows.
 
         One above 0 is that of its row's upper limit, one below 0 that of the lower limit. If there
-        is no such limit, it counts as 0. Any multipliers give a bound (weak duality), a finite one
-        if all columns have limits.
+        is no such limit, it counts as 0. Any multipliers give a bound (weak duality).
 
         Parameters
         ----------
         multipliers
             One for each row, in the order in which rows were added.
         """
-        worth, lower, upper = map(np.concatenate, (self.worth, self.lower, self.upper))
+        worth, lower, most = map(np.concatenate, (self.worth, self.lower, self.most))
         paid, total, at = np.zeros(len(worth)), 0.0, 0
         for rows in self.rows:
             own = multipliers[at : at + len(rows)]
@@ -163,7 +173,7 @@ class Program:
             paid += np.bincount(rows.column, weights=entries, minlength=len(paid))
         left = worth - paid
         is_used = left != 0.0
-        return total + float((left * np.where(left > 0.0, upper, lower))[is_used].sum())
+        return total + float((left * np.where(left > 0.0, most, lower))[is_used].sum())
 
     def add_rows(self, rows: Rows) -> None:
         """Add constraints, if there are any."""

@@ -171,8 +171,9 @@ def _add_shares(
     program.add_rows(Rows.aligned((down[images], 1.0), (taken[images], -1.0), upper=0.0))
     fills = np.flatnonzero((terms.data_gain > 0.0) | (down >= 0))
     gain = terms.data_gain[fills[1:]]
+    upper = np.append(np.full(len(fills) - 1, np.inf), 0.0)
     most = np.append(np.cumsum(gain[::-1])[::-1], 0.0)
-    after = program.add_columns(np.zeros(len(fills)), upper=most, is_integer=False)
+    after = program.add_columns(np.zeros(len(fills)), upper=upper, most=most, is_integer=False)
     next_one = taken[fills[1:]]
     program.add_rows(
         Rows.aligned((after[:-1], 1.0), (after[1:], -1.0), (next_one, -gain), lower=0.0, upper=0.0)
@@ -192,6 +193,7 @@ def _add_cost_of_data_left(
     """Charge for data that the recorder holds at the end beyond what it held at the start."""
     start = max(satellite.resources.initial_recorder_fraction, 0.0)
     most = max(0.0, float(terms.recorder_top[-1]) - margin - start)
-    cost = np.array([-terms.left_cost])
-    left = program.add_columns(cost, lower=-start, upper=most, is_integer=False)
+    left = program.add_columns(
+        np.array([-terms.left_cost]), lower=-start, upper=np.inf, most=most, is_integer=False
+    )
     program.add_rows(Rows.aligned((left, 1.0), (level[-1:], -1.0), lower=-start))
