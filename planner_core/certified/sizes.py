@@ -93,3 +93,7 @@ PAUSE_S: Final = 0.25
 
 MAX_STARTS: Final = 1000
 """How far apart the seeds of two starts of a search lie."""
+
+SLOT_S: Final = 120.0
+"""Length of the slots into which a relaxation for continuous starts divides the horizon. A quarter
+of it proves 0.4 % less in five times the time."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.whole_program import (
     RowMultipliers,
     program_to_relax,
+    slots_to_relax,
     whole_program_value,
 )
 from planner_core.certified.tuning import TUNING
@@ -52,16 +54,25 @@ def whole_relaxation(problem: Problem, budget: Budget, seed: int) -> WholeRelaxa
 def _bound(model: PlanProgram, multipliers: Floats, cliques: list[Ints]) -> Bound:
     """Return the bound that the row duals prove."""
     of_rows, of_cliques = np.split(multipliers, [model.program.num_rows])
-    rows = np.flatnonzero(of_rows)
     is_used = np.flatnonzero(of_cliques > 0.0)
-    proof = RowMultipliers(
-        rows=rows.astype(np.int32),
-        of_rows=of_rows[rows],
+    proof = replace(
+        RowMultipliers.of(of_rows),
         cliques=tuple(cliques[i] for i in is_used),
         of_cliques=tuple(of_cliques[is_used].tolist()),
     )
     value = whole_program_value(model, proof)
     return Bound(value=value, proof="linear", row_multipliers=proof)
+
+
+def relaxation_over_slots(problem: Problem, budget: Budget, seed: int) -> Bound:
+    """Return the bound by the linear relaxation over slots of time, for continuous starts."""
+    program = slots_to_relax(problem)
+    engine = Engine(program, budget, seed, is_chained=True)
+    engine.relaxed()
+    value = program.dual_value(engine.row_multipliers)
+    return Bound(
+        value=value, proof="linear", row_multipliers=RowMultipliers.of(engine.row_multipliers)
+    )
 
 
 def cut_by_cliques(engine: Engine, model: PlanProgram, rounds: int, watch: Watch) -> list[Ints]:

@@ -7,13 +7,14 @@ of them. The order of images is left out. So no plan earns more than the program
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.sizes import NEXT_CONTACTS
 from planner_core.certified.tolerances import DOWN
 from planner_core.problem import (
-    COLLECT,
     CONTACT,
     Bools,
     Floats,
@@ -25,52 +26,57 @@ from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.worth import share_earned
 
 
+class Images(NamedTuple):
+    """Images of one satellite, with their columns. Shape ``(num_images,)``.
+
+    Attributes
+    ----------
+    row
+        Their opportunities.
+    columns
+        What limits how much of each comes down.
+    first_end_s, last_end_s
+        The earliest and the latest end of each.
+    on_board
+        What each earns if it stays on board.
+    """
+
+    row: Ints
+    columns: Ints
+    first_end_s: Floats
+    last_end_s: Floats
+    on_board: Floats
+
+
 def add_deliveries(
-    program: Program, problem: Problem, taken: Ints, may_come: Ints, on_board: Floats
+    program: Program, problem: Problem, satellite: SatelliteProblem, images: Images, taken: Ints
 ) -> None:
     """Add what images earn beyond their worth on board.
 
     Parameters
     ----------
     taken
-        The columns x. Shape ``(n,)``.
-    may_come
-        Columns that limit what comes down of each image; x if there is no other. Shape ``(n,)``.
-    on_board
-        What each image earns if it stays on board. Shape ``(n,)``.
+        Columns of the satellite's contacts, at their place among its tasks. Shape ``(m,)``.
     """
-    for satellite in problem.satellites:
-        _add_satellite(program, problem, satellite, taken, may_come, on_board)
-
-
-def _add_satellite(
-    program: Program,
-    problem: Problem,
-    satellite: SatelliteProblem,
-    taken: Ints,
-    may_come: Ints,
-    on_board: Floats,
-) -> None:
-    table, rows = problem.opportunities, satellite.rows
-    images = rows[satellite.kind == COLLECT]
-    contacts = rows[(satellite.kind == CONTACT) & (satellite.volume > 0.0)]
-    image, place, is_named = _next_contacts(table.end_s[images], table.start_s[contacts])
+    table = problem.opportunities
+    own = np.flatnonzero((satellite.kind == CONTACT) & (satellite.volume > 0.0))
+    contacts, by = satellite.rows[own], taken[own]
+    image, place, is_named = _next_contacts(images.first_end_s, table.start_s[contacts])
     if len(image) == 0:
         return
-    of_image, contact = images[image], contacts[place]
+    of_image, contact = images.row[image], contacts[place]
     ready_s = table.start_s[contact] + problem.downlinks.stations.setup_s[table.site[contact]]
-    age_s = ready_s - table.end_s[of_image]
+    age_s = np.maximum(ready_s - images.last_end_s[image], 0.0)
     earned = problem.worth_on_ground[of_image] * share_earned(problem.objective, age_s)
-    gain = np.minimum(earned, problem.worth[of_image]) - on_board[of_image]
+    gain = np.minimum(earned, problem.worth[of_image]) - images.on_board[image]
     down = program.add_columns(np.maximum(gain, 0.0), is_integer=False)
-    once = np.ones(len(down))
-    program.add_rows(Rows.limited(down, once, of_image, may_come, np.ones(len(table))))
+    once, every = np.ones(len(down)), np.ones(len(images.row))
+    program.add_rows(Rows.limited(down, once, image, images.columns, every))
     size = (table.end_s - table.start_s)[of_image] * satellite.resources.collect_fill_per_s
-    volume = np.zeros(len(table))
-    volume[contacts] = satellite.volume[problem.local_row[contacts]] + DOWN
-    named, by = down[is_named], contact[is_named]
-    program.add_rows(Rows.limited(named, size[is_named], by, taken, volume))
-    program.add_rows(Rows.aligned((named, 1.0), (taken[by], -1.0), upper=0.0))
+    volume = satellite.volume[own] + DOWN
+    named, nth = down[is_named], place[is_named]
+    program.add_rows(Rows.limited(named, size[is_named], nth, by, volume))
+    program.add_rows(Rows.aligned((named, 1.0), (by[nth], -1.0), upper=0.0))
 
 
 def _next_contacts(end_s: Floats, start_s: Floats) -> tuple[Ints, Ints, Bools]:

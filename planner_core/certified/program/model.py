@@ -10,7 +10,7 @@ import numpy as np
 
 from planner_core.certified.dp.resource_network import must_deliver, worth_before_left
 from planner_core.certified.program.clique_cuts import clique_cover, detours, excluding_pairs
-from planner_core.certified.program.deliveries import add_deliveries
+from planner_core.certified.program.deliveries import Images, add_deliveries
 from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.program.resource_terms import ResourceTerms, resource_terms
 from planner_core.certified.program.resources import add_resources
@@ -23,6 +23,7 @@ from planner_core.precedence.relation import (
     transitive_closure,
 )
 from planner_core.problem import (
+    COLLECT,
     CONTACT,
     Floats,
     Ints,
@@ -189,7 +190,12 @@ def _variables(
         down[may_come] = program.add_columns(lost[may_come])
         _once_per_target(program, problem, taken)
         if ages:
-            add_deliveries(program, problem, taken, np.where(may_come, down, taken), worth)
+            came = np.where(may_come, down, taken)
+            for satellite in problem.satellites:
+                rows = satellite.rows[satellite.kind == COLLECT]
+                end_s = table.end_s[rows]
+                images = Images(rows, came[rows], end_s, end_s, worth[rows])
+                add_deliveries(program, problem, satellite, images, taken[satellite.rows])
         return taken, down, None
     taken = program.add_columns(np.zeros(len(table)), lower=kept.astype(np.float64))
     down[may_come] = program.add_columns(np.zeros(int(may_come.sum())))

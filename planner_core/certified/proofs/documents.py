@@ -28,11 +28,7 @@ from planner_core.certified.proofs.latency import latency_value
 from planner_core.certified.proofs.queues import queue_value
 from planner_core.certified.proofs.resource_bound import resource_value
 from planner_core.certified.proofs.totals import totals_bound
-from planner_core.certified.proofs.whole_program import (
-    RowMultipliers,
-    program_to_relax,
-    whole_program_value,
-)
+from planner_core.certified.proofs.whole_program import RowMultipliers, relaxed_value
 from planner_core.certified.tolerances import WRITTEN
 from planner_core.problem import Floats, Problem
 from planner_core.problem.on_board import most_on_board
@@ -133,9 +129,7 @@ def _value(problem: Problem, bound: Bound) -> float | None:
         totals = totals_bound(problem)
         return np.inf if totals is None else totals.value
     if bound.row_multipliers is not None:
-        if problem.continuous_starts:  # the program has the opportunities' starts alone
-            return np.inf
-        return whole_program_value(program_to_relax(problem), bound.row_multipliers)
+        return relaxed_value(problem, bound.row_multipliers)
     if bound.multipliers is None:
         return None
     if problem.continuous_starts:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner_core.certified.dp.resource_network import left_cost
-from planner_core.certified.program.linear_program import Rows
+from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.program.model import OnBoard, PlanProgram, plan_program
+from planner_core.certified.program.slots import has_slot_program, slot_program
 from planner_core.certified.tolerances import TOUCHING
 from planner_core.precedence.relation import fit_beside, is_transitive
 from planner_core.problem import COLLECT, Floats, Ints, Problem
@@ -36,6 +37,18 @@ class RowMultipliers:
     of_rows: Floats
     cliques: tuple[Ints, ...] = ()
     of_cliques: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, multipliers: Floats) -> RowMultipliers:
+        """Return those of a program without cuts. Shape ``(num_rows,)``."""
+        rows = np.flatnonzero(multipliers)
+        return cls(rows=rows.astype(np.int32), of_rows=multipliers[rows])
+
+    def of_all_rows(self, num_rows: int) -> Floats:
+        """Return the multipliers of all rows of the program. Shape ``(num_rows,)``."""
+        every = np.zeros(num_rows)
+        every[self.rows] = self.of_rows
+        return every
 
 
 def program_to_relax(problem: Problem) -> PlanProgram:
@@ -66,6 +79,24 @@ def charges_for_data_left(problem: Problem) -> bool:
     )
 
 
+def relaxed_value(problem: Problem, multipliers: RowMultipliers) -> float:
+    """Return the bound that multipliers prove, with continuous starts by ``slot_program``.
+
+    Infinite if they prove nothing.
+    """
+    if not problem.continuous_starts:
+        return whole_program_value(program_to_relax(problem), multipliers)
+    if multipliers.cliques or not has_slot_program(problem):
+        return float("inf")
+    program = slots_to_relax(problem)
+    return program.dual_value(multipliers.of_all_rows(program.num_rows))
+
+
+def slots_to_relax(problem: Problem) -> Program:
+    """Return the program whose linear relaxation bounds all plans with continuous starts."""
+    return slot_program(problem, costs_left=charges_for_data_left(problem))
+
+
 def whole_program_value(model: PlanProgram, multipliers: RowMultipliers) -> float:
     """Return the bound that multipliers prove; infinite if a cut is not valid.
 
@@ -82,8 +113,7 @@ def whole_program_value(model: PlanProgram, multipliers: RowMultipliers) -> floa
     cliques, of_cliques = multipliers.cliques, multipliers.of_cliques
     if not _are_cliques(model.problem, cliques) or min(of_cliques, default=0.0) < 0.0:
         return float("inf")
-    of_rows = np.zeros(model.program.num_rows)
-    of_rows[multipliers.rows] = multipliers.of_rows
+    of_rows = multipliers.of_all_rows(model.program.num_rows)
     rows = list(model.program.rows)
     if cliques:
         offsets = np.cumsum([0, *map(len, cliques)])

@@ -15,7 +15,10 @@ from planner_core.certified.lns.insertion_with_resources import (
     filled_with_resources,
     replanned_window,
 )
+from planner_core.certified.mip.whole_relaxation import relaxation_over_slots
 from planner_core.certified.multipliers.chains import ascend_on_chains
+from planner_core.certified.program.slots import has_slot_program
+from planner_core.certified.strategies.supports import has_few_deliveries, has_half_life
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
 from planner_core.problem.plan import Plan
@@ -55,6 +58,20 @@ class FreeStarts:
         """Offer the search's plan."""
         self._best.offer(self.search.plan)
         self._best.report(message)
+
+
+def slot_relaxation(search: Search) -> Iterator[None]:
+    """Bound plans by the linear relaxation over slots of time, if its limits hold for all plans.
+
+    It takes less than a third of a second up to 2,000 accesses, and some seconds if images age.
+    """
+    problem = search.problem
+    if has_half_life(problem) and not has_few_deliveries(problem):
+        yield
+    if has_slot_program(problem):
+        search.best.lower(relaxation_over_slots(problem, search.budget, search.seed))
+        search.best.report("relaxation")
+    yield
 
 
 def chain_multipliers(search: Search) -> Iterator[None]:

@@ -259,6 +259,11 @@ STRATEGIES: Final = (
     ),
     # Continuous starts.
     Strategy(
+        name="relaxation over slots",
+        supports=has_continuous_starts_with_resources,
+        slices=continuous.slot_relaxation,
+    ),
+    Strategy(
         name="fixed starts",
         supports=has_continuous_starts_with_resources,
         slices=continuous.fixed_starts,
