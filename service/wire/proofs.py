@@ -78,7 +78,9 @@ class ProofOut(Wire):
         None, description="With continuous starts: the width of the cells of start times."
     )
     row_prices: RowMultipliersOut | None = Field(
-        None, description="If the linear relaxation of the whole program proves the bound."
+        None,
+        description="If the linear relaxation of the whole program proves the bound, or with "
+        "continuous starts of the one over slots of time.",
     )
     amount: float | None = Field(None, description="The reward that `refutation` rules out.")
     refutation: RefutationOut | None = None

@@ -1,7 +1,8 @@
 """Bounds by multipliers of all rows of the whole program.
 
 The linear relaxation of the whole program knows energy, data and antennas at once. Its row duals
-are multipliers: put into the program's dual function they prove a bound, whoever found them.
+are multipliers: put into the program's dual function they prove a bound, whoever found them. With
+continuous starts a program over slots of time takes its place.
 """
 
 from __future__ import annotations
