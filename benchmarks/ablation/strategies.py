@@ -180,7 +180,7 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "choices from the best plan": _RESOURCES | _CLOUDS,
             "whole relaxation": _CLOUDS | {"share-sun-250": 15.0},
             "whole relaxation with ages": {"half-life-3h-share-paper-300": 10.0},
-            "relaxation over slots": {"continuous-sun-fleet-3x500": 10.0},
+            "relaxation over slots": {"continuous-sun-500": 10.0},
             "a fleet's contacts exchanged": _TRAIN,
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,

@@ -216,6 +216,10 @@ FAMILIES: Final[Mapping[str, Family]] = {
         num_satellites=3, num_targets=500, budget_s=15.0, quick_budget_s=None,
         continuous_starts=True, dynamics="physical", objective=_shared(0.9), turns_to_sun=True,
     ),
+    "continuous-sun-500": Family(
+        num_targets=500, budget_s=10.0, quick_budget_s=None,
+        continuous_starts=True, dynamics="physical", turns_to_sun=True,
+    ),
     "half-life-3h-1000": Family(
         num_targets=1000, budget_s=10.0, quick_budget_s=8.0, dynamics="physical",
         objective=_halved_in(3.0),

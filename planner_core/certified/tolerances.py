@@ -34,6 +34,9 @@ DOWN: Final = 2e-9
 DOWN_S: Final = 1e-5
 """How much earlier that may make the instant when an image is down."""
 
+ROUNDED_S: Final = 1e-3
+"""Starts are whole milliseconds."""
+
 EARLIER_S: Final = 0.02
 """How much too early a guessed start is put, so that for most guesses no exact one is needed."""
 

@@ -24,13 +24,11 @@ from planner_core.certified.dp.resource_network import left_cost, must_deliver, 
 from planner_core.certified.program.deliveries import Images, add_deliveries
 from planner_core.certified.program.linear_program import Program, Rows
 from planner_core.certified.sizes import SLOT_S
-from planner_core.certified.tolerances import DOWN, ON_BOARD, ROUNDING
+from planner_core.certified.tolerances import DOWN, ON_BOARD, ROUNDED_S, ROUNDING
 from planner_core.precedence.antennas import antenna_groups
 from planner_core.precedence.time_windows import time_windows_of
 from planner_core.problem import CONTACT, Floats, Ints, Longs, Problem, SatelliteProblem
 from planner_core.problem.delivery import lost_on_board
-
-_ROUNDED_S = 1e-3  # starts are whole milliseconds
 
 
 def has_slot_program(problem: Problem) -> bool:
@@ -123,8 +121,8 @@ def _add_deliveries(
     images = Images(
         row=windows.row,
         columns=whole,
-        first_end_s=windows.open_s + windows.length_s - _ROUNDED_S,
-        last_end_s=windows.close_s + windows.length_s + _ROUNDED_S,
+        first_end_s=windows.open_s + windows.length_s - ROUNDED_S,
+        last_end_s=windows.close_s + windows.length_s + ROUNDED_S,
         on_board=(problem.worth - lost_on_board(problem))[windows.row],
     )
     add_deliveries(program, problem, satellite, images, taken[satellite.rows])
@@ -167,7 +165,7 @@ class _Slots(NamedTuple):
         satellite, windows = problem.satellites[index], time_windows_of(problem, index)
         num_slots = max(1, math.ceil(problem.horizon_s / SLOT_S))
         edge_s = np.linspace(0.0, problem.horizon_s, num_slots + 1)
-        open_s, close_s = windows.open_s - _ROUNDED_S, windows.close_s + _ROUNDED_S
+        open_s, close_s = windows.open_s - ROUNDED_S, windows.close_s + ROUNDED_S
         first, last = (_slot_of(edge_s, at_s) for at_s in (open_s, close_s))
         count = last - first + 1
         window = np.repeat(np.arange(len(count)), count)
@@ -262,7 +260,7 @@ def _add_times(
     which, where = slots.part
     slot = np.concatenate([slots.slot, where])
     length_s = np.concatenate([slots.length_s, slots.during_s])
-    most_s = slots.edge_s[1] + float(slots.length_s.max(initial=0.0)) + _ROUNDED_S
+    most_s = slots.edge_s[1] + float(slots.length_s.max(initial=0.0)) + ROUNDED_S
     columns = np.concatenate([image, contact[which]])
     program.add_rows(_sums(slot, columns, length_s, upper=most_s))
     start_s, end_s = satellite.start_s[slots.contacts], satellite.end_s[slots.contacts]
