@@ -21,6 +21,7 @@ from planner_core.certified.tolerances import TOUCHING
 from planner_core.domain import Objective
 from planner_core.problem import Problem
 from planner_core.problem.delivery import with_objective
+from planner_core.problem.downlink import Downlinks, StationLinks
 from planner_core.problem.slew import TIME_TOLERANCE_S
 from planner_core.referee.replay import replay
 from planner_core.solvers.milp import Milp
@@ -97,6 +98,22 @@ def test_a_contact_may_begin_as_an_image_ends_to_the_tolerance_of_times() -> Non
     best = best_reward(problem)
     assert best > 0.5
     assert _program_bound(problem) >= best
+
+
+def test_a_later_contact_may_be_ready_sooner() -> None:
+    """The first takes a minute to set up, the second begins a little later and needs none."""
+    tasks = [collect(0, 100.0), contact(300.0, 400.0), replace(contact(310.0, 410.0), site=1)]
+    links = StationLinks(gain=np.ones(2), setup_s=np.array([60.0, 0.0]))
+    bare = replace(ROOMY, telemetry_per_s=0.0, initial_recorder_fraction=0.0)
+    problem = make_problem(
+        tasks, num_targets=1, num_stations=2, resources=bare, downlinks=Downlinks(stations=links)
+    )
+    problem = with_objective(problem, Objective(collected_share=0.0, half_life_s=100.0))
+    best = best_reward(problem)
+    assert best > 2.0 ** (-(360.0 - 130.0) / 100.0)
+    for num_named in (0, 1, 8):
+        with mock.patch.object(deliveries, "NEXT_CONTACTS", num_named):
+            assert _program_bound(problem) >= best
 
 
 @examples(150)

@@ -64,9 +64,12 @@ def add_deliveries(
     image, place, is_named = _next_contacts(images.first_end_s, table.start_s[contacts])
     if len(image) == 0:
         return
-    of_image, contact = images.row[image], contacts[place]
-    ready_s = table.start_s[contact] + problem.downlinks.stations.setup_s[table.site[contact]]
-    age_s = np.maximum(ready_s - images.last_end_s[image], 0.0)
+    of_image = images.row[image]
+    ready_s = table.start_s[contacts] + problem.downlinks.stations.setup_s[table.site[contacts]]
+    # The last one named stands for later ones too, of which one with less setup is ready sooner.
+    soonest_s = np.minimum.accumulate(ready_s[::-1])[::-1]
+    down_s = np.where(is_named, ready_s[place], soonest_s[place])
+    age_s = np.maximum(down_s - images.last_end_s[image], 0.0)
     earned = problem.worth_on_ground[of_image] * share_earned(problem.objective, age_s)
     gain = np.minimum(earned, problem.worth[of_image]) - images.on_board[image]
     down = program.add_columns(np.maximum(gain, 0.0), is_integer=False)
