@@ -11,12 +11,16 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from planner_core.budget import Budget
+from planner_core.certified.driver import Search
+from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.whole_relaxation import relaxation_over_slots
 from planner_core.certified.program import slots
 from planner_core.certified.program.slots import has_slot_program
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.whole_program import RowMultipliers
+from planner_core.certified.strategies.continuous import slot_relaxation
+from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective, Resources
 from planner_core.pinning.apply_pins import apply_pins
 from planner_core.problem import Pinned, Problem, Sunlight
@@ -118,3 +122,15 @@ def test_what_idling_or_frozen_actions_break_is_no_limit() -> None:
         bound = Bound(value=100.0, proof="linear", row_multipliers=proof)
         assert is_proven(problem, bound)
         assert not is_proven(changed, bound)
+
+
+def test_large_problems_go_without_it() -> None:
+    problem = flat_problem(1, num_contacts=1, use_resources=True)
+
+    def proofs() -> list[str]:
+        search = Search(Incumbent(problem, Budget(), 0.0), 0, ())
+        return [search.best.bound.proof for _ in slot_relaxation(search)]
+
+    assert proofs() == ["linear"]
+    with tuned(most_relaxed=len(problem.opportunities) - 1):
+        assert proofs() == []

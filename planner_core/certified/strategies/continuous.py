@@ -63,14 +63,17 @@ class FreeStarts:
 def slot_relaxation(search: Search) -> Iterator[None]:
     """Bound plans by the linear relaxation over slots of time, if its limits hold for all plans.
 
-    It takes less than a third of a second up to 2,000 accesses, and some seconds if images age.
+    It takes less than a third of a second up to 2,000 accesses, and two up to 12,000. If images age
+    it may take some seconds, and comes after a turn of the others.
     """
     problem = search.problem
+    most = TUNING.most_columns if has_half_life(problem) else TUNING.most_relaxed
+    if len(problem.opportunities) > most or not has_slot_program(problem):
+        return
     if has_half_life(problem) and not has_few_deliveries(problem):
         yield
-    if has_slot_program(problem):
-        search.best.lower(relaxation_over_slots(problem, search.budget, search.seed))
-        search.best.report("relaxation")
+    search.best.lower(relaxation_over_slots(problem, search.budget, search.seed))
+    search.best.report("relaxation")
     yield
 
 
