@@ -134,7 +134,7 @@ def _are_cliques(problem: Problem, sets: tuple[Ints, ...]) -> bool:
         return False
     for number in np.unique(of_first):
         is_own = of_first == number
-        one, other = local[first[is_own]], local[second[is_own]]
+        one, other = (local[rows[is_own]].astype(np.int64) for rows in (first, second))
         if fit_beside(problem.satellites[number], one, other).any():
             return False
     return True
