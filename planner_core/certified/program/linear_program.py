@@ -76,6 +76,13 @@ class Rows:
         return cls.of(offsets.astype(np.int64), column, upper=np.array(limits, dtype=np.float64))
 
     @classmethod
+    def no_more_than(cls, columns: Ints, others: Ints, offsets: npt.NDArray[np.int64]) -> Rows:
+        """Return rows that limit each column to the sum of its group of others."""
+        column = np.insert(others, offsets[1:], columns)
+        value = np.insert(np.full(len(others), -1.0), offsets[1:], 1.0)
+        return cls.of(offsets + np.arange(len(offsets)), column, value, upper=0.0)
+
+    @classmethod
     def limited(cls, columns: Ints, values: Floats, group: Ints, limit: Ints, most: Floats) -> Rows:
         """Return rows that limit each group's sum of ``value * column`` by a multiple of a column.
 

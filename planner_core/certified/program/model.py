@@ -231,7 +231,7 @@ def _paid_for_the_best(
     paid = Paid.of(problem, lost)
     offsets = paid.offsets
     collected = program.add_columns(paid.worth - paid.lost, is_integer=False)
-    program.add_rows(_no_more_than(collected, taken[paid.rows], offsets))
+    program.add_rows(Rows.no_more_than(collected, taken[paid.rows], offsets))
     first = np.flatnonzero(np.diff(paid.target, prepend=-1, append=-1))
     groups = [collected[a:b] for a, b in itertools.pairwise(first) if b - a > 1]
     program.add_rows(Rows.at_most(groups, [1.0] * len(groups)))
@@ -240,15 +240,8 @@ def _paid_for_the_best(
     delivered = program.add_columns(paid.lost[comes], is_integer=False)
     program.add_rows(Rows.aligned((delivered, 1.0), (collected[comes], -1.0), upper=0.0))
     counts = np.concatenate([[0], np.cumsum(np.diff(offsets)[comes])])
-    program.add_rows(_no_more_than(delivered, down[paid.rows[of_image]], counts))
+    program.add_rows(Rows.no_more_than(delivered, down[paid.rows[of_image]], counts))
     return paid
-
-
-def _no_more_than(columns: Ints, others: Ints, offsets: Longs) -> Rows:
-    """Return rows that limit each column to the sum of its group of others."""
-    column = np.insert(others, offsets[1:], columns)
-    value = np.insert(np.full(len(others), -1.0), offsets[1:], 1.0)
-    return Rows.of(offsets + np.arange(len(offsets)), column, value, upper=0.0)
 
 
 def _constraints(

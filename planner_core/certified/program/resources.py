@@ -56,7 +56,8 @@ def add_resources(
         _add_delivery(program, satellite, terms.delivered, level, taken)
     _add_shares(program, terms, level, taken, down, margin)
     if terms.left_cost > 0.0:
-        _add_cost_of_data_left(program, satellite, terms, level, margin)
+        start = max(satellite.resources.initial_recorder_fraction, 0.0)
+        add_cost_of_data_left(program, terms.left_cost, start, level[-1:])
 
 
 def _add_battery(
@@ -187,13 +188,18 @@ def _add_shares(
     )
 
 
-def _add_cost_of_data_left(
-    program: Program, satellite: SatelliteProblem, terms: ResourceTerms, level: Ints, margin: float
-) -> None:
-    """Charge for data that the recorder holds at the end beyond what it held at the start."""
-    start = max(satellite.resources.initial_recorder_fraction, 0.0)
-    most = max(0.0, float(terms.recorder_top[-1]) - margin - start)
+def add_cost_of_data_left(program: Program, left_cost: float, start: float, last: Ints) -> None:
+    """Charge for data that the recorder holds at the end beyond what it held at the start.
+
+    Parameters
+    ----------
+    start
+        Its level at the start, at least 0.
+    last
+        The column of its level after the last task.
+    """
+    # No more than the recorder holds, with room for rounding.
     left = program.add_columns(
-        np.array([-terms.left_cost]), lower=-start, upper=np.inf, most=most, is_integer=False
+        np.array([-left_cost]), lower=-start, upper=np.inf, most=2.0, is_integer=False
     )
-    program.add_rows(Rows.aligned((left, 1.0), (level[-1:], -1.0), lower=-start))
+    program.add_rows(Rows.aligned((left, 1.0), (last, -1.0), lower=-start))

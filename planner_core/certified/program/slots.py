@@ -23,6 +23,7 @@ import numpy as np
 from planner_core.certified.dp.resource_network import left_cost, must_deliver, worth_before_left
 from planner_core.certified.program.deliveries import Images, add_deliveries
 from planner_core.certified.program.linear_program import Program, Rows
+from planner_core.certified.program.resources import add_cost_of_data_left
 from planner_core.certified.sizes import SLOT_S
 from planner_core.certified.tolerances import DOWN, ON_BOARD, ROUNDED_S, ROUNDING
 from planner_core.precedence.antennas import antenna_groups
@@ -90,11 +91,11 @@ def slot_program(problem: Problem, *, costs_left: bool) -> Program:
         _add_battery(program, satellite, slots, image, contact)
         level = _add_recorder(program, satellite, slots, image, contact)
         _add_times(program, satellite, slots, image, contact)
+        start = max(satellite.resources.initial_recorder_fraction, 0.0) + ON_BOARD
         if must_deliver(problem, satellite):
-            most = max(satellite.resources.initial_recorder_fraction, 0.0) + ON_BOARD
-            program.add_rows(Rows.aligned((level[-1:], 1.0), upper=most))
+            program.add_rows(Rows.aligned((level[-1:], 1.0), upper=start))
         elif costs_left:
-            _add_cost_of_data_left(program, problem, satellite, level)
+            add_cost_of_data_left(program, left_cost(problem, satellite), start, level[-1:])
         if ages:
             _add_deliveries(program, problem, index, slots, image, taken)
         site.append(problem.opportunities.site[slots.row])
@@ -113,11 +114,8 @@ def _add_deliveries(
     """Add what images earn by the contacts after their accesses, whatever the slot."""
     satellite, windows = problem.satellites[index], time_windows_of(problem, index)
     whole = program.add_columns(np.zeros(len(windows.row)), is_integer=False)
-    counts = np.diff(np.append(np.flatnonzero(np.diff(slots.window, prepend=-1)), len(image)))
-    offsets = np.concatenate([[0], np.cumsum(counts + 1)]).astype(np.int64)
-    column = np.insert(image, np.cumsum(counts), whole)
-    value = np.insert(np.full(len(image), -1.0), np.cumsum(counts), 1.0)
-    program.add_rows(Rows.of(offsets, column, value, upper=0.0))
+    offsets = np.searchsorted(slots.window, np.arange(len(whole) + 1))
+    program.add_rows(Rows.no_more_than(whole, image, offsets))
     images = Images(
         row=windows.row,
         columns=whole,
@@ -267,16 +265,6 @@ def _add_times(
     at_once = (start_s <= start_s[:, None]) & (end_s > start_s[:, None])
     instant, during = np.nonzero(at_once & (at_once.sum(axis=1) > 1)[:, None])
     program.add_rows(_sums(instant, contact[during], upper=1.0))
-
-
-def _add_cost_of_data_left(
-    program: Program, problem: Problem, satellite: SatelliteProblem, level: Ints
-) -> None:
-    """Charge for data that the recorder holds at the end beyond what it held at the start."""
-    start = max(satellite.resources.initial_recorder_fraction, 0.0) + ON_BOARD
-    cost = np.array([-left_cost(problem, satellite)])
-    left = program.add_columns(cost, lower=-start, upper=1.0, is_integer=False)
-    program.add_rows(Rows.aligned((left, 1.0), (level[-1:], -1.0), lower=-start))
 
 
 _Term = tuple[Longs, Ints, Floats]
