@@ -156,6 +156,7 @@ _UNEVEN: Final = {
     "quality-sun-network-8x1000": 20.0, "weights-fleet-4x2000": 20.0,
     "weights-share-sun-fleet-4x500": 15.0,
 }  # fmt: skip
+_DIFFERING: Final = {"spaced-weights-1000": 20.0}
 _TRAIN: Final = {"share-sun-train-4x500": 20.0}
 _LARGE_FLEET: Final = {"fleet-24x10000": 60.0}
 _SMALL: Final = {"tight-150": 10.0, "tight-weights-300": 10.0, "physical-200": 10.0}
@@ -180,7 +181,8 @@ STRATEGIES: Final[Mapping[str, Change]] = {
             "choices from the best plan": _RESOURCES | _CLOUDS,
             "whole relaxation": _CLOUDS | {"share-sun-250": 15.0},
             "whole relaxation with ages": {"half-life-3h-share-paper-300": 10.0},
-            "relaxation over slots": {"continuous-sun-500": 10.0},
+            "relaxation over slots": {"continuous-sun-500": 10.0, **_DIFFERING},
+            "sampled starts": {"continuous-sun-500": 10.0, "continuous-sun-fleet-3x500": 15.0},
             "a fleet's contacts exchanged": _TRAIN,
             "multipliers": _RESOURCES,
             "programs with contacts fixed": _RESOURCES,

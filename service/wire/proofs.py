@@ -36,6 +36,10 @@ class RowMultipliersOut(Wire):
         description="Opportunities of one satellite that exclude each other pairwise."
     )
     clique_prices: tuple[float, ...]
+    of_slots: bool = Field(
+        description="Whether the rows are those of the program over slots of time, in which images "
+        "may start anywhere in a slot and turns are left out."
+    )
 
 
 class ProofOut(Wire):
@@ -79,8 +83,8 @@ class ProofOut(Wire):
     )
     row_prices: RowMultipliersOut | None = Field(
         None,
-        description="If the linear relaxation of the whole program proves the bound, or with "
-        "continuous starts of the one over slots of time.",
+        description="If the linear relaxation of the whole program proves the bound, or that of "
+        "the program over slots of time.",
     )
     amount: float | None = Field(None, description="The reward that `refutation` rules out.")
     refutation: RefutationOut | None = None

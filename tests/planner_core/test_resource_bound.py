@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from typing import Literal
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from planner_core.certified.proofs import resource_bound
-from planner_core.certified.proofs.documents import is_proven
+from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.lagrangian import lagrangian_bound
 from planner_core.certified.proofs.resource_bound import quick_bound, resource_value
 from planner_core.certified.proofs.satellite_relaxation import relaxations
@@ -79,14 +80,26 @@ def test_it_lies_far_below_what_agility_allows_where_energy_is_short() -> None:
     assert quick_bound(problem, 0.0).value < 0.7 * quick_bound(starved, 0.0).value
 
 
-def test_it_is_that_of_agility_where_near_pairs_take_too_long(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("dynamics", ["physical", "paper"])
+@examples(200)
+@given(seed=SEEDS, has_quality=st.booleans())
+def test_batteries_alone_prove_one_where_near_pairs_take_too_long(
+    dynamics: Literal["physical", "paper"], seed: int, has_quality: bool
 ) -> None:
+    problem = _problem(seed, dynamics, num_collects=6, has_quality=has_quality)
+    with patch.object(resource_bound, "MAX_STEPS", 0):
+        bound = quick_bound(problem, 0.0)
+    assert bound.value >= best_reward(problem) - 1e-9
+    assert is_proven(problem, from_json(to_json(bound)))
+    assert bound.value <= lagrangian_bound(problem, 0.0).value + 1e-9
+
+
+def test_batteries_alone_prove_less_than_agility_where_energy_is_short() -> None:
     problem = random_problem(1, num_collects=40, num_targets=40, num_contacts=0)
-    assert quick_bound(problem, 0.0).proof == "dp"
-    monkeypatch.setattr(resource_bound, "MAX_STEPS", 0)
-    bound = quick_bound(problem, 0.0)
-    assert (bound.proof, bound.value) == ("lagrangian", lagrangian_bound(problem, 0.0).value)
+    with patch.object(resource_bound, "MAX_STEPS", 0):
+        bound = quick_bound(problem, 0.0)
+    assert bound.proof == "dp"
+    assert bound.value < 0.9 * lagrangian_bound(problem, 0.0).value
 
 
 @examples(30)

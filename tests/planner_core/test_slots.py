@@ -1,4 +1,4 @@
-"""The relaxation over slots of time, which bounds plans with continuous starts."""
+"""The relaxation over slots of time, which bounds plans without regard to turns."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from planner_core.budget import Budget
 from planner_core.certified.driver import Search
 from planner_core.certified.incumbent import Incumbent
 from planner_core.certified.mip.whole_relaxation import relaxation_over_slots
-from planner_core.certified.program import slots
+from planner_core.certified.program import slot_table
 from planner_core.certified.program.slots import has_slot_program
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
 from planner_core.certified.proofs.whole_program import RowMultipliers
-from planner_core.certified.strategies.continuous import slot_relaxation
+from planner_core.certified.strategies.resources import slot_relaxation
 from planner_core.certified.tuning import tuned
 from planner_core.domain import Objective, Resources
 from planner_core.pinning.apply_pins import apply_pins
-from planner_core.problem import Pinned, Problem, Sunlight
+from planner_core.problem import COLLECT, Pinned, Problem, Sunlight
 from planner_core.problem.delivery import with_objective
 from planner_core.problem.plan import Plan
 from planner_core.referee.replay import replay
 from tests.examples import examples
 from tests.planner_core.brute_force import best_reward
 from tests.planner_core.flat_earth import flat_problem
-from tests.planner_core.problems import TIGHT
+from tests.planner_core.problems import TIGHT, varied_problem
 
 _SLOW_LINK = replace(TIGHT, downlink_per_s=0.5 * TIGHT.downlink_per_s)
 _DRAINING = replace(TIGHT, idle_drain_per_s=0.1 * TIGHT.sunpoint_charge_per_s)
@@ -80,13 +80,58 @@ def test_no_plan_with_starts_of_the_table_beats_it(
     problem = _problem(seed, resources, objective, num_satellites)
     fixed = replace(problem, continuous_starts=False, pointing=None)
     assume(has_slot_program(problem))
-    with patch.object(slots, "SLOT_S", slot_s):
+    with patch.object(slot_table, "SLOT_S", slot_s):
         bound = relaxation_over_slots(problem, Budget(), 0)
-        assert bound.value >= best_reward(fixed) - 1e-6
+        best = best_reward(fixed)
+        assert bound.value >= best - 1e-6
+        if has_slot_program(fixed):
+            assert relaxation_over_slots(fixed, Budget(), 0).value >= best - 1e-6
         read = from_json(to_json(bound))
         assert is_proven(problem, read)
         too_low = 0.999 * bound.value - problem.reward_unit - 1e-6
         assert not is_proven(problem, replace(read, value=too_low))
+
+
+@examples(200)
+@given(
+    seed=st.integers(0, 10**6),
+    objective=st.sampled_from(_OBJECTIVES[:3]),
+    num_satellites=st.integers(1, 2),
+    slot_s=st.sampled_from([20.0, 120.0]),
+)
+def test_images_of_an_access_may_differ_in_worth(
+    seed: int, objective: Objective, num_satellites: int, slot_s: float
+) -> None:
+    problem = with_objective(
+        varied_problem(
+            seed, "physical", num_satellites, scarce=_SLOW_LINK, num_collects=7, has_quality=True
+        ),
+        objective,
+    )
+    assume(has_slot_program(problem))
+    with patch.object(slot_table, "SLOT_S", slot_s):
+        bound = relaxation_over_slots(problem, Budget(), 0)
+        assert bound.value >= best_reward(problem) - 1e-6
+        read = from_json(to_json(bound))
+        assert read.row_multipliers is not None
+        assert read.row_multipliers.is_of_slots
+        assert is_proven(problem, read)
+
+
+def test_images_that_start_in_a_slot_are_one() -> None:
+    problem = _problem(2, TIGHT, Objective.collected())
+    fixed = replace(problem, continuous_starts=False, pointing=None)
+    table = slot_table.slot_table(fixed, 0)
+    start_s, access = fixed.opportunities.start_s, fixed.opportunities.access
+    own = np.flatnonzero(fixed.opportunities.kind == COLLECT)
+    slots = {(int(access[row]), int(start_s[row] // 100.0)) for row in own}
+    assert table.num_slots == 4
+    assert len(table.images.slot) == len(slots) < len(own)
+    assert sorted(table.images.member) == sorted(own)
+    for image, members in enumerate(np.split(table.images.member, table.images.first[1:])):
+        assert table.images.from_s[image] == start_s[members].min()
+        assert table.images.to_s[image] == start_s[members].max()
+        assert len(set(access[members])) == 1
 
 
 def test_energy_for_two_images_allows_no_third() -> None:
@@ -105,7 +150,9 @@ def test_what_idling_or_frozen_actions_break_is_no_limit() -> None:
     assert has_slot_program(problem)
     assert not has_slot_program(replace(problem, use_resources=False))
     assert not has_slot_program(replace(problem, dynamics="paper"))
-    assert not has_slot_program(replace(problem, continuous_starts=False, pointing=None))
+    fixed = replace(problem, continuous_starts=False, pointing=None)
+    assert has_slot_program(fixed)
+    assert not has_slot_program(with_objective(fixed, _OBJECTIVES[-1]))
     assert not has_slot_program(flat_problem(1, num_targets=1, horizon_s=20.0, use_resources=True))
     frozen = apply_pins(problem, Pinned(frozen_until_s=10.0))
     assert not has_slot_program(frozen)
@@ -118,7 +165,7 @@ def test_what_idling_or_frozen_actions_break_is_no_limit() -> None:
         changed = replace(problem, satellites=satellites)
         assert replay(changed, Plan()) is not None
         assert not has_slot_program(changed)
-        proof = RowMultipliers(rows=np.empty(0, np.int32), of_rows=np.empty(0))
+        proof = RowMultipliers.of(np.zeros(0), is_of_slots=True)
         bound = Bound(value=100.0, proof="linear", row_multipliers=proof)
         assert is_proven(problem, bound)
         assert not is_proven(changed, bound)
@@ -132,5 +179,5 @@ def test_large_problems_go_without_it() -> None:
         return [search.best.bound.proof for _ in slot_relaxation(search)]
 
     assert proofs() == ["linear"]
-    with tuned(most_relaxed=len(problem.opportunities) - 1):
+    with tuned(most_relaxed=len(np.unique(problem.opportunities.access)) - 1):
         assert proofs() == []

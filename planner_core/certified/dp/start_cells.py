@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from planner_core.bundles import bundle
-from planner_core.certified.sizes import OPENING_LEVELS
+from planner_core.certified.sizes import OPENING_LEVELS, SLOWER
 from planner_core.jit import kernel
 from planner_core.precedence.earliest_starts import EarliestStarts, earliest_starts_of
 from planner_core.precedence.time_windows import TimeWindows, View
@@ -59,16 +59,17 @@ class Cells(NamedTuple):
     spare_s: float
 
 
-def cells_of(spans: TimeWindows, view: View, width_s: float) -> Cells | None:
-    """Return a satellite's cells; None if it turns no faster than lines of sight do.
+def cells_of(spans: TimeWindows, view: View, width_s: float) -> Cells:
+    """Return a satellite's cells.
 
-    An acceleration limit only makes turns longer. It is ignored here, because with it a later
-    start may allow an earlier start of the next task.
+    If it turns more slowly than lines of sight do, or accelerates slowly, a later start may allow
+    an earlier start of the next task. So acceleration is ignored here, and it turns a little faster
+    than lines of sight at least: every chain remains one.
     """
-    view = view._replace(agile=Agile(view.agile.rate_deg_s, INSTANT, view.agile.settle_s))
-    share = greatest_rate_deg_s(spans, view) / view.agile.rate_deg_s
-    if share >= 1.0:
-        return None
+    greatest_deg_s = greatest_rate_deg_s(spans, view)
+    rate_deg_s = max(view.agile.rate_deg_s, greatest_deg_s / SLOWER)
+    view = view._replace(agile=Agile(rate_deg_s, INSTANT, view.agile.settle_s))
+    share = greatest_deg_s / rate_deg_s
     least_s = float(spans.length_s.min()) if len(spans.row) else 1.0
     earliest = earliest_starts_of(spans, view, min(width_s, 0.9 * least_s))
     count = np.diff(earliest.first_cell)

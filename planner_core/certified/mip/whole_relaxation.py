@@ -65,14 +65,13 @@ def _bound(model: PlanProgram, multipliers: Floats, cliques: list[Ints]) -> Boun
 
 
 def relaxation_over_slots(problem: Problem, budget: Budget, seed: int) -> Bound:
-    """Return the bound by the linear relaxation over slots of time, for continuous starts."""
+    """Return the bound by the linear relaxation over slots of time."""
     program = slots_to_relax(problem)
     engine = Engine(program, budget, seed, is_chained=True)
     engine.relaxed()
+    proof = RowMultipliers.of(engine.row_multipliers, is_of_slots=True)
     value = program.dual_value(engine.row_multipliers)
-    return Bound(
-        value=value, proof="linear", row_multipliers=RowMultipliers.of(engine.row_multipliers)
-    )
+    return Bound(value=value, proof="linear", row_multipliers=proof)
 
 
 def cut_by_cliques(engine: Engine, model: PlanProgram, rounds: int, watch: Watch) -> list[Ints]:

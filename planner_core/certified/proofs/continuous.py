@@ -3,8 +3,9 @@ r"""A bound on plans with continuous starts.
 Weak duality as in ``planner_core.certified.proofs.lagrangian``: multipliers of targets, and for
 each satellite the heaviest chain of its tasks, here with starts anywhere in the accesses and each
 access used at most once. ``planner_core.certified.dp.start_labels`` explains why its labels are
-never worth less than the heaviest chain. Satellites must turn faster than lines of sight do: then
-the earliest start is the best one, and chains are sequences of accesses.
+never worth less than the heaviest chain. Satellites turn faster than lines of sight do (those that
+do not are bounded as if they did): then the earliest start is the best one, and chains are
+sequences of accesses.
 
 Battery, recorder, stations and antennas are left out, which can only raise the bound.
 """
@@ -105,7 +106,7 @@ class ContinuousDual:
     def of(
         cls, problem: Problem, width_s: float, stop: Bytes | None = None
     ) -> ContinuousDual | None:
-        """Return it; None if a satellite is slower than its lines of sight, or ``stop`` is set."""
+        """Return it; None if ``stop`` is set."""
         parts = []
         is_offered = np.zeros(len(problem.target_ids), dtype=np.bool_)
         for index in range(len(problem.satellites)):
@@ -117,8 +118,6 @@ class ContinuousDual:
                 if len(piece.row) == 0:
                     continue
                 cells = cells_of(piece, view_of(problem, index), width_s)
-                if cells is None:
-                    return None
                 parts.append((cells, labels_of(cells, LABELS_PER_CELL)))
         return cls(problem=problem, parts=tuple(parts), is_offered=is_offered)
 

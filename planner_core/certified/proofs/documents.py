@@ -148,7 +148,9 @@ def _value(problem: Problem, bound: Bound) -> float | None:
             problem, bound.multipliers, bound.contact_multipliers, bound.antenna_multipliers
         )
     elif bound.unit is not None:
-        value = resource_value(problem, bound.multipliers, bound.unit, bound.antenna_multipliers)
+        value = resource_value(
+            problem, bound.multipliers, bound.unit, bound.antenna_multipliers, level=bound.value
+        )
     elif bound.is_elementary:
         value, _ = elementary_value(problem, bound.multipliers)
     else:
@@ -162,6 +164,7 @@ def _row_multipliers_to_json(multipliers: RowMultipliers) -> dict[str, Any]:
         "prices": multipliers.of_rows.tolist(),
         "cliques": [clique.tolist() for clique in multipliers.cliques],
         "clique_prices": list(multipliers.of_cliques),
+        "of_slots": multipliers.is_of_slots,
     }
 
 
@@ -171,6 +174,7 @@ def _row_multipliers_from_json(document: dict[str, Any]) -> RowMultipliers:
         of_rows=np.array(document["prices"], dtype=np.float64),
         cliques=tuple(np.array(clique, dtype=np.int32) for clique in document["cliques"]),
         of_cliques=tuple(document["clique_prices"]),
+        is_of_slots=bool(document.get("of_slots", False)),
     )
 
 

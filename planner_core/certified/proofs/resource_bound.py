@@ -12,6 +12,7 @@ pay (``planner_core.precedence.antennas``).
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -49,19 +50,32 @@ def whole_worth(
 
 
 def resource_value(
-    problem: Problem, multipliers: Floats, unit: float, antenna_multipliers: Floats | None = None
+    problem: Problem,
+    multipliers: Floats,
+    unit: float,
+    antenna_multipliers: Floats | None = None,
+    *,
+    level: float = -np.inf,
 ) -> float:
     """Return the bound that multipliers of targets, and of antennas if there are any, prove.
 
     This is the whole proof: it needs no search, only the problem. The bound holds however finely
     the recorder is counted; as neither of two finenesses is always better, the lower bound counts.
+
+    Parameters
+    ----------
+    level
+        A bound that suffices: if batteries alone prove it, recorders are left out.
     """
+    fine, coarse = (relaxations(problem, levels) for levels in (TUNING.fine, TUNING.coarse))
+    if antenna_multipliers is None:
+        by_battery = _battery_value(problem, coarse, multipliers, unit)
+        if rounded_bound(problem, by_battery, 0.0) <= level:
+            return by_battery
     stop = np.zeros(1, dtype=np.uint8)
     return min(
-        _value(
-            problem, relaxations(problem, levels), multipliers, unit, 0.0, stop, antenna_multipliers
-        )
-        for levels in (TUNING.fine, TUNING.coarse)
+        _value(problem, satellites, multipliers, unit, 0.0, stop, antenna_multipliers)
+        for satellites in (fine, coarse)
     )
 
 
@@ -120,19 +134,20 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     stop = np.zeros(1, dtype=np.uint8)
     unit = _unit(problem, satellites, best.value)
     num_units = best.value / unit / len(satellites)
-    if num_units * max(satellite.num_near_steps for satellite in satellites) > MAX_STEPS:
-        return best
+    is_large = num_units * max(satellite.num_near_steps for satellite in satellites) > MAX_STEPS
     start = np.zeros(1) if best.multipliers is None else best.multipliers
     offered = [
         leaving_whole_units(problem, share * start, unit) for share in TUNING.multiplier_shares
     ]
-    if is_plain:
-        offered = offered[:1]
-    else:
-        # The bound by batteries alone takes a fraction of the time, and shows which are best.
-        offered.sort(key=lambda multipliers: _battery_value(problem, satellites, multipliers, unit))
-    for multipliers in offered[: TUNING.tries]:
-        value = _value(problem, satellites, multipliers, unit, reward, stop)
+    # The bound by batteries alone takes a fraction of the time, and shows which are best.
+    by_battery = partial(_battery_value, problem, satellites, unit=unit)
+    offered = offered[:1] if is_plain else sorted(offered, key=by_battery)
+    for multipliers in offered[:1] if is_large else offered[: TUNING.tries]:
+        value = (
+            by_battery(multipliers)
+            if is_large
+            else _value(problem, satellites, multipliers, unit, reward, stop)
+        )
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
             best = Bound(value=rounded, proof="dp", multipliers=multipliers, unit=unit)
@@ -155,8 +170,11 @@ def _battery_value(
     problem: Problem, satellites: tuple[SatelliteRelaxation, ...], multipliers: Floats, unit: float
 ) -> float:
     """Return the bound at these multipliers without recorders."""
+    multipliers = surplus(multipliers, problem.best_worth)
     worth = whole_worth(problem, multipliers, unit)
-    return float(multipliers.sum()) + unit * sum(s.most_by_battery(worth) for s in satellites)
+    units = sum(s.most_by_battery(worth) for s in satellites)
+    rounded_away = ROUNDING * len(problem.opportunities) * unit
+    return float(multipliers.sum()) + units * unit + rounded_away
 
 
 def _unit(problem: Problem, satellites: tuple[SatelliteRelaxation, ...], value: float) -> float:

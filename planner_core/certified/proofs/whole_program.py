@@ -2,7 +2,8 @@
 
 The linear relaxation of the whole program knows energy, data and antennas at once. Its row duals
 are multipliers: put into the program's dual function they prove a bound, whoever found them. With
-continuous starts a program over slots of time takes its place.
+continuous starts a program over slots of time takes its place, and with many starts of images that
+differ in worth it comes first.
 """
 
 from __future__ import annotations
@@ -32,18 +33,21 @@ class RowMultipliers:
     cliques, of_cliques
         Opportunities of one satellite that exclude each other pairwise, so that a plan takes at
         most one; and the multiplier of each such set, not negative.
+    is_of_slots
+        Whether the rows are those of the program over slots of time.
     """
 
     rows: Ints
     of_rows: Floats
     cliques: tuple[Ints, ...] = ()
     of_cliques: tuple[float, ...] = ()
+    is_of_slots: bool = False
 
     @classmethod
-    def of(cls, multipliers: Floats) -> RowMultipliers:
+    def of(cls, multipliers: Floats, *, is_of_slots: bool = False) -> RowMultipliers:
         """Return those of a program without cuts. Shape ``(num_rows,)``."""
         rows = np.flatnonzero(multipliers)
-        return cls(rows=rows.astype(np.int32), of_rows=multipliers[rows])
+        return cls(rows=rows.astype(np.int32), of_rows=multipliers[rows], is_of_slots=is_of_slots)
 
     def of_all_rows(self, num_rows: int) -> Floats:
         """Return the multipliers of all rows of the program. Shape ``(num_rows,)``."""
@@ -81,11 +85,10 @@ def charges_for_data_left(problem: Problem) -> bool:
 
 
 def relaxed_value(problem: Problem, multipliers: RowMultipliers) -> float:
-    """Return the bound that multipliers prove, with continuous starts by ``slot_program``.
-
-    Infinite if they prove nothing.
-    """
-    if not problem.continuous_starts:
+    """Return the bound that multipliers prove; infinite if they prove nothing."""
+    if not multipliers.is_of_slots:
+        if problem.continuous_starts:
+            return float("inf")
         return whole_program_value(program_to_relax(problem), multipliers)
     if multipliers.cliques or not has_slot_program(problem):
         return float("inf")
@@ -94,7 +97,7 @@ def relaxed_value(problem: Problem, multipliers: RowMultipliers) -> float:
 
 
 def slots_to_relax(problem: Problem) -> Program:
-    """Return the program whose linear relaxation bounds all plans with continuous starts."""
+    """Return the program over slots whose linear relaxation bounds all plans."""
     return slot_program(problem, costs_left=charges_for_data_left(problem))
 
 

@@ -27,6 +27,7 @@ from planner_core.certified.strategies.supports import (
     has_continuous_starts_alone,
     has_continuous_starts_with_resources,
     has_one_start_each,
+    has_slots,
     has_steady_worth,
     is_agility_only_fleet,
     is_agility_only_satellite,
@@ -45,6 +46,7 @@ from planner_core.certified.strategies.supports import (
     is_small_free_fleet,
     is_small_free_fleet_with_choice,
     is_within_reach,
+    samples_starts,
 )
 from planner_core.certified.tuning import TUNING
 from planner_core.problem import Problem
@@ -62,6 +64,11 @@ STRATEGIES: Final = (
         supports=has_steady_worth,
         slices=resources.resource_bound,
         begin=Begin.ALWAYS,
+    ),
+    Strategy(
+        name="relaxation over slots",
+        supports=has_slots,
+        slices=resources.slot_relaxation,
     ),
     Strategy(
         name="bound by agility",
@@ -259,14 +266,14 @@ STRATEGIES: Final = (
     ),
     # Continuous starts.
     Strategy(
-        name="relaxation over slots",
-        supports=has_continuous_starts_with_resources,
-        slices=continuous.slot_relaxation,
-    ),
-    Strategy(
         name="fixed starts",
         supports=has_continuous_starts_with_resources,
         slices=continuous.fixed_starts,
+    ),
+    Strategy(
+        name="sampled starts",
+        supports=samples_starts,
+        slices=continuous.sampled_starts,
     ),
     Strategy(
         name="insertion",
