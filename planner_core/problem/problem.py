@@ -362,7 +362,8 @@ class Problem:
     @cached_property
     def offers_choice(self) -> bool:
         """Whether some access offers several collects."""
-        return len(np.unique(self.opportunities.access)) < len(self.opportunities)
+        access = self.opportunities.access[self.opportunities.kind == COLLECT]
+        return len(np.unique(access)) < len(access)
 
     @cached_property
     def target_opportunities(self) -> tuple[Ints, Longs]:

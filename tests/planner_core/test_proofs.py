@@ -7,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.missions import paper_scenario, problem_of
+from planner_core.budget import Budget
+from planner_core.certified.multipliers.resources import ResourceAscent
 from planner_core.certified.proofs.bound import Bound
 from planner_core.certified.proofs.certificate import Certificate, Multipliers, Refutation
 from planner_core.certified.proofs.documents import from_json, is_proven, to_json
@@ -14,6 +17,7 @@ from planner_core.certified.proofs.lagrangian import lagrangian_value
 from planner_core.domain import Objective, Resources
 from planner_core.problem import COLLECT, CONTACT, Problem
 from planner_core.problem.delivery import with_objective
+from planner_core.solvers.rule import Rule
 from tests.planner_core.problems import Task, make_problem
 
 
@@ -57,3 +61,17 @@ def test_an_amount_that_no_plan_reaches_by_agility_leaves_the_next_one_below() -
     assert not is_proven(problem, replace(bound, value=1.9))
     too_low = replace(certificate, amount=2.0)
     assert not is_proven(problem, replace(bound, certificate=too_low))
+
+
+def test_what_a_search_proves_by_knowing_its_goal_is_proven_without() -> None:
+    """Images that earn a share on board are split at an instant, which depends on the goal."""
+    scenario = paper_scenario(40, 0, use_resources=True)
+    problem = problem_of(replace(scenario, objective=Objective(collected_share=0.9)))
+    half = 0.5 * problem.best_worth
+    ascent = ResourceAscent(problem, float(problem.best_worth.sum()), half, np.zeros(1, np.uint8))
+    ascent.learn(Rule().solve(problem, Budget(), 0).plan)
+    for _ in range(11):
+        assert ascent.step(0.0)
+        bound = ascent.bound()
+        assert is_proven(problem, from_json(to_json(bound)))
+        assert not is_proven(problem, replace(bound, value=0.99 * bound.value))

@@ -74,7 +74,7 @@ def resource_value(
             return by_battery
     stop = np.zeros(1, dtype=np.uint8)
     return min(
-        _value(problem, satellites, multipliers, unit, 0.0, stop, antenna_multipliers)
+        _value(problem, satellites, multipliers, unit, 0.0, stop, antenna_multipliers, twice=True)
         for satellites in (fine, coarse)
     )
 
@@ -98,14 +98,28 @@ def _value(
     enough: float,
     stop: Bytes,
     antenna_multipliers: Floats | None = None,
+    *,
+    twice: bool = False,
 ) -> float:
-    """Return the bound at these multipliers, or ``enough`` if that is more."""
+    """Return the bound at these multipliers, or ``enough`` if that is more.
+
+    Parameters
+    ----------
+    twice
+        Whether to count again with the gain that is known then. If images earn a share on board,
+        a search that knew it from the start may have proven less.
+    """
     multipliers = surplus(multipliers, problem.best_worth)
     worth = whole_worth(problem, multipliers, unit, antenna_multipliers)
     paid = float(multipliers.sum()) + paid_for_antennas(problem, antenna_multipliers)
     # Only a single satellite may stop early: of several, what the others gain is not yet known.
     units_enough = int(np.floor((enough - paid) / unit)) if len(satellites) == 1 else 0
-    units = sum(s.most(worth, unit, max(units_enough, 0), stop)[0] for s in satellites)
+    units = 0
+    for satellite in satellites:
+        most, _ = satellite.most(worth, unit, max(units_enough, 0), stop)
+        if twice and satellite.shares is not None:
+            most = min(most, satellite.most(worth, unit, 0, stop, near=most)[0])
+        units += most
     rounded_away = ROUNDING * len(problem.opportunities) * unit
     return max(paid + units * unit + rounded_away, enough)
 
