@@ -221,8 +221,8 @@ FAMILIES: Final[Mapping[str, Family]] = {
         continuous_starts=True, dynamics="physical", turns_to_sun=True,
     ),
     "spaced-sun-500": Family(
-        num_targets=500, budget_s=15.0, quick_budget_s=None, spacing_s=15.0, dynamics="physical",
-        turns_to_sun=True,
+        num_targets=500, budget_s=15.0, quick_budget_s=None,
+        spacing_s=15.0, dynamics="physical", turns_to_sun=True,
     ),
     "spaced-weights-1000": Family(
         num_targets=1000, budget_s=20.0, quick_budget_s=None, spacing_s=60.0, dynamics="physical",

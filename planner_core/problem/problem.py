@@ -361,6 +361,11 @@ class Problem:
 
     @cached_property
     def offers_choice(self) -> bool:
+        """Whether some access offers several opportunities: starts of a collect, or contacts."""
+        return len(np.unique(self.opportunities.access)) < len(self.opportunities)
+
+    @cached_property
+    def offers_starts(self) -> bool:
         """Whether some access offers several collects."""
         access = self.opportunities.access[self.opportunities.kind == COLLECT]
         return len(np.unique(access)) < len(access)

@@ -106,8 +106,8 @@ def _value(
     Parameters
     ----------
     twice
-        Whether to count again with the gain that is known then. If images earn a share on board,
-        a search that knew it from the start may have proven less.
+        Whether to count again, now that the gain is known. Where images earn a share on board, the
+        bound is lower the better the gain is known from the start, as searches know it.
     """
     multipliers = surplus(multipliers, problem.best_worth)
     worth = whole_worth(problem, multipliers, unit, antenna_multipliers)
@@ -156,12 +156,11 @@ def quick_bound(problem: Problem, reward: float) -> Bound:
     # The bound by batteries alone takes a fraction of the time, and shows which are best.
     by_battery = partial(_battery_value, problem, satellites, unit=unit)
     offered = offered[:1] if is_plain else sorted(offered, key=by_battery)
-    for multipliers in offered[:1] if is_large else offered[: TUNING.tries]:
-        value = (
-            by_battery(multipliers)
-            if is_large
-            else _value(problem, satellites, multipliers, unit, reward, stop)
-        )
+    for multipliers in offered[: 1 if is_large else TUNING.tries]:
+        if is_large:
+            value = by_battery(multipliers)
+        else:
+            value = _value(problem, satellites, multipliers, unit, reward, stop)
         if value < best.value:
             rounded = rounded_bound(problem, value, reward)
             best = Bound(value=rounded, proof="dp", multipliers=multipliers, unit=unit)

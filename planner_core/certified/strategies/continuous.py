@@ -80,7 +80,7 @@ def fixed_starts(search: Search) -> Iterator[None]:
 def sampled_starts(search: Search) -> Iterator[None]:
     """Plan among many starts in each access, and insert tasks that fit in between.
 
-    Plans have 1 to 9 % more than with the own starts alone (docs/bounds.md).
+    Plans earn up to 9 % more than with the own starts alone (docs/bounds.md).
     """
     yield from _plans_among(search, with_sampled_starts(search.problem))
 

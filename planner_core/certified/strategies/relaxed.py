@@ -44,7 +44,7 @@ class Relaxed:
         # Each pair of near tasks has a column then, and many starts make many pairs: with it four
         # satellites over 200 targets, starts 30 s apart, have a bound of 213.8 after 15 CPU
         # seconds. Exact programmes, which then come before it, have one of 194.0 by then.
-        is_slow = problem.offers_choice and problem.turns_to_the_sun
+        is_slow = problem.offers_starts and problem.turns_to_the_sun
         is_meant = is_loose and is_small and not is_slow
         if self.is_known or not is_meant or num_near_pairs(problem) > MAX_PAIRS:
             return

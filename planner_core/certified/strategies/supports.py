@@ -54,7 +54,7 @@ def has_slots(problem: Problem) -> bool:
     """
     if has_continuous_starts(problem):
         return problem.use_resources
-    return has_steady_worth(problem) and problem.offers_choice
+    return has_steady_worth(problem) and problem.offers_starts
 
 
 def samples_starts(problem: Problem) -> bool:
